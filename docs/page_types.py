@@ -28,9 +28,6 @@ LINE_LENGTH = 120
 NO_BREAK = "\0"
 """Stands for a space at which no line ends."""
 
-NAMED = {("State", "touch"): "Page.Touch | null"}
-"""Types, in ``page.d.ts``, of the fields whose classes do not say what they hold."""
-
 SIMPLE = {
     "string": "string",
     "number": "number",
@@ -63,8 +60,7 @@ def _declared(name: str, schema: dict[str, Any], omitted: bool) -> list[str]:
     fields = []
     for field, kind in schema["properties"].items():
         mark = "?" if omitted and field not in schema.get("required", ()) else ""
-        shape = NAMED.get((name, field)) or _type(kind)
-        fields.append(f"{field}{mark}: {shape};".replace(" ", NO_BREAK))
+        fields.append(f"{field}{mark}: {_type(kind)};".replace(" ", NO_BREAK))
     return _wrapped(f"interface {name} {{ {' '.join(fields)} }}")
 
 

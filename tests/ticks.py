@@ -51,6 +51,15 @@ def rested(session: Session, state: State, *commands: cmd.Command, ticks: int = 
     return until_rest(session, state, *commands, ticks=ticks)[-1]
 
 
+def settled(session: Session, state: State) -> State:
+    """Return the state in which the loose objects rest."""
+    for _ in range(2000):
+        if not state.objects_move:
+            return state
+        state = ticked(session, state)
+    raise AssertionError("The loose objects do not come to rest.")
+
+
 def during(session: Session, state: State, seconds: float, *commands: cmd.Command) -> list[State]:
     """Return the states after the ticks of a time [s], with ``commands`` in the first one."""
     return list(islice(states(session, state, *commands), round(seconds / TICK)))

@@ -155,8 +155,8 @@ class Extension:
         world: Returns the collision world of a robot, None without shapes, sentences on what it
             leaves out, and cautions for its driver. Of the first extension that has it.
         hand: Returns the hand of a robot, given its collision world and the hand, completed by its
-            sides, its closed end, or a model of the forces in it. Called for each session of an
-            arm, in the order of the extensions.
+            sides and its closed end. Called for each session of an arm, in the order of the
+            extensions.
         expand: Returns the URDF (bytes) of a xacro file. Of the first extension that has it. Raises
             RobotDescriptionError.
         find_arm: Returns the arm outside the five-axis family in a URDF, with its kinematics, or

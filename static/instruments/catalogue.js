@@ -1,6 +1,5 @@
 // All instruments of an arm, with their titles, elements and the values that they show of a state.
-import { PressureMaps } from "../touch/maps.js";
-import { DEGREES, MM, readings } from "./channels.js";
+import { DEGREES, MM, readings, spoken } from "./channels.js";
 import { Command } from "./command.js";
 import { Bars, Gauge } from "./gauge.js";
 import { Knob } from "./knob.js";
@@ -22,9 +21,9 @@ const ROW = ["wide", "large", "broad"];
 const BIG = ["broad", "large", "wide"];
 
 // Return [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}].
-/** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Plotted & { say: Page.Say }} page @returns {Instrument[]} */
-export function instruments(arm, gripper, { say, history, groups, view }) {
-  return [...knobs(arm, gripper, say), ...(arm.touch ? [pads()] : []), ...gauges(arm, gripper), ...plots(arm, gripper, history, groups, view)];
+/** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Plotted & { say: Page.Say, touch: Api.State["touch"] }} page @returns {Instrument[]} */
+export function instruments(arm, gripper, { say, history, groups, view, touch }) {
+  return [...knobs(arm, gripper, say), ...gauges(arm), ...(touch ? [grip(touch)] : []), ...plots(arm, gripper, history, groups, view)];
 }
 
 /** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Page.Say} say */
@@ -76,14 +75,6 @@ function knobs(arm, gripper, say) {
   return [...joints, ...(fingers ? [fingers] : []), speed];
 }
 
-/** @returns {Instrument} */
-function pads() {
-  const maps = new PressureMaps();
-  /** @param {Api.State} state */
-  const draw = ({ touch }) => maps.show(touch);
-  return { id: "pads", title: "Pressure on the pads", sizes: ["large", "wide"], shown: true, element: maps.element, draw };
-}
-
 /**
  * @param {string} id @param {string} title @param {Omit<import("./gauge.js").GaugeOptions, "title">} options
  * @param {(state: Api.State, loop: Api.Loop | null) => [value: number | null, note?: string]} of
@@ -99,8 +90,8 @@ function gauge(id, title, options, of) {
 /** @param {number} value */
 const one = (value) => signed(value, 1);
 
-/** @param {Api.Arm} arm @param {Fingers | null} gripper @returns {Instrument[]} */
-function gauges(arm, gripper) {
+/** @param {Api.Arm} arm @returns {Instrument[]} */
+function gauges(arm) {
   const read = readings(arm);
   const rows = arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, limit: arm.speed[i] * read[i].of }));
   const units = [...new Set(read.map(({ mark }) => `${mark.trim()}/s`))];
@@ -121,12 +112,12 @@ function gauges(arm, gripper) {
   );
   // The other gauges need a tool, which a mechanism of joints does not have.
   if (arm.joints_only) return [rates, late];
-  const [clearance, ...others] = toolGauges(arm, gripper);
+  const [clearance, ...others] = toolGauges(arm);
   return [clearance, rates, ...others, late];
 }
 
-/** @param {Api.Arm} arm @param {Fingers | null} gripper @returns {Instrument[]} */
-function toolGauges(arm, gripper) {
+/** @param {Api.Arm} arm @returns {Instrument[]} */
+function toolGauges(arm) {
   return [
     gauge(
       "clearance",
@@ -175,18 +166,15 @@ function toolGauges(arm, gripper) {
           ),
         ]
       : []),
-    ...(gripper
-      ? [
-          gauge(
-            "touch",
-            "Touch",
-            { low: 0, high: 2, unit: "of 2 fingers", text: (value) => signed(value, 0) },
-            ({ touching, held }) => [touching.length, held === null ? "empty hand" : `holds ${spoken(held)}`],
-          ),
-        ]
-      : []),
   ];
 }
+
+/** The greatest force of a finger, and what is held. @param {NonNullable<Api.State["touch"]>} touch */
+const grip = ({ force_limit: high }) =>
+  gauge("touch", "Grip force", { low: 0, high, unit: "N", text: one }, ({ touch, held }) => {
+    const forces = touch?.fingers.map(({ force }) => force) ?? [];
+    return [Math.max(0, ...forces), held === null ? "empty hand" : `holds ${spoken(held)}`];
+  });
 
 /** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Plotted["history"]} history @param {Plotted["groups"]} groups @param {Plotted["view"]} view @returns {Instrument[]} */
 function plots(arm, gripper, history, groups, view) {
@@ -211,11 +199,8 @@ function plots(arm, gripper, history, groups, view) {
     plot("joint-loads", "Weight on the joints [N m]", "loads", 1, 2, true),
     ...joints.slice(2),
     ...(gripper ? [plot("gripper-opening", "Gripper [%]", "gripper", 2, 1, false)] : []),
-    ...(arm.touch ? [plot("grip-forces", "Grip force [N]", "forces", 1, 2, false)] : []),
+    ...(groups.forces.length ? [plot("grip-forces", "Forces of the fingers [N]", "forces", 1, 2, false)] : []),
     plot("clearances", "Clearance [mm]", "clearance", 2, 1, false),
     plot("tool-speeds", "Tool speed [mm/s]", "speed", 2, 1, false),
   ];
 }
-
-/** @param {string} part */
-const spoken = (part) => part.replace(/_link$/, "").replaceAll("_", " ");

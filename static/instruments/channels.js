@@ -5,14 +5,17 @@ export const MM = 1000;
 /** @typedef {{ label: string, short?: string, unit: string, of: (state: Api.State) => number | null | undefined }} Channel */
 /** @typedef {{ percent: (angle: number) => number, angle: (percent: number) => number }} Fingers */
 
+/** Return the name for people of a link or an object. @param {string} part */
+export const spoken = (part) => part.replace(/_link$/, "").replaceAll("_", " ");
+
 /** Return {of, unit, mark} for each joint: factor to display units, unit, and its mark after numbers. @param {Api.Arm} arm */
 export function readings(arm) {
   return arm.slides.map((slides) => (slides ? { of: MM, unit: "mm", mark: " mm" } : { of: DEGREES, unit: "deg", mark: "°" }));
 }
 
 // Return {channels, groups}; a group is a list of channel indices. gripper: {percent(angle)} or null.
-/** @param {Api.Arm} arm @param {Fingers | null} gripper */
-export function channelsOf(arm, gripper) {
+/** @param {Api.Arm} arm @param {Fingers | null} gripper @param {string[]} fingers names of those with a force */
+export function channelsOf(arm, gripper, fingers) {
   /** @type {Channel[]} */
   const channels = [];
   /** @type {Record<string, number[]>} */
@@ -40,9 +43,6 @@ export function channelsOf(arm, gripper) {
       { label: "Goal", unit: "%", of: ({ gripper_goal: angle }) => gripper.percent(angle) },
     );
   }
-  if (arm.touch) {
-    const pads = ["Right", "Left"]; // in the order of the state
-    group("forces", ...pads.map((label, i) => /** @type {Channel} */ ({ label, unit: "N", of: ({ touch }) => touch?.pads[i].force })));
-  }
+  group("forces", ...fingers.map((name, i) => /** @type {Channel} */ ({ label: spoken(name), unit: "N", of: ({ touch }) => touch?.fingers[i].force })));
   return { channels, groups };
 }

@@ -22,6 +22,8 @@ export class Panel {
   #history = null;
   /** @type {Board | null} */
   #board = null;
+  /** @type {Api.Arm | null} */
+  #arm = null;
   /** @type {Api.State | null} */
   #state = null;
   /** @type {Api.Loop | null} */
@@ -58,32 +60,33 @@ export class Panel {
   /** Handle each event of the page's connection. @param {Page.LinkEvent} message */
   hear({ heard, took, link }) {
     if (link === "down") this.#spring();
-    if (heard?.is === "arm" && !this.#board) this.#build(heard);
+    if (heard?.is === "arm") this.#arm = heard;
     else if (heard?.is === "loop") this.#loop = heard;
     else if (heard?.is === "state") {
       [this.#state, this.#took, this.#heard, this.#fresh] = [heard, took ?? 0, performance.now(), true];
       this.#history?.take(heard);
     } else if (heard?.is === "done" || heard?.is === "refused")
       this.#board?.instruments.find(({ id }) => id === heard.id)?.knob?.answered(heard);
+    if (this.#arm && this.#state && !this.#board) this.#build(this.#arm, this.#state);
   }
 
   #ask() {
     const { say, quietly } = this.#connection;
-    if (!this.#board) say({ do: "query", at: "arm", id: quietly });
+    if (!this.#arm) say({ do: "query", at: "arm", id: quietly });
     say({ do: "query", at: "loop", id: quietly });
   }
 
-  /** @param {Api.Arm} arm */
-  #build(arm) {
+  /** @param {Api.Arm} arm @param {Api.State} state */
+  #build(arm, { touch }) {
     const [closed, open] = arm.gripper ?? [0, 0];
     /** @type {import("./channels.js").Fingers | null} */
     const gripper = arm.gripper && {
       percent: (angle) => (100 * (angle - closed)) / (open - closed),
       angle: (percent) => closed + (percent / 100) * (open - closed),
     };
-    const { channels, groups } = channelsOf(arm, gripper);
+    const { channels, groups } = channelsOf(arm, gripper, touch?.fingers.map(({ finger }) => finger) ?? []);
     this.#history = new History(channels);
-    const parts = { say: this.#connection.say, history: this.#history, groups, view: this.#view };
+    const parts = { say: this.#connection.say, history: this.#history, groups, view: this.#view, touch };
     this.#board = new Board(instruments(arm, gripper, parts), this.#connection.kept);
     this.#body.replaceChildren(this.#board.list, this.#board.grid);
   }

@@ -47,7 +47,7 @@ function felt(before, state, old) {
 
 /** Return the force of the grip as a fraction of the greatest one. @param {Api.State} state */
 function strength({ touch }) {
-  return touch ? Math.max(...touch.pads.map(({ force }) => force)) / touch.force_limit : 0;
+  return touch ? Math.max(...touch.fingers.map(({ force }) => force)) / touch.force_limit : 0;
 }
 
 /** Return how near a contact or a joint limit is, from 0 to 1, while the arm moves or is blocked by it. @param {Api.State} state */

@@ -78,8 +78,9 @@ def test_instruments_are_those_of_the_arm(six: ViserPage) -> None:
         "6 wrist 3",
     ]
     # It has no hand.
-    for name in ("pads", "touch", "gripper"):
-        assert not six.page.locator(f"#instruments .card[data-id={name}]").count()
+    cards = six.page.locator("#instruments .card")
+    for name in ("touch", "grip-forces", "gripper"):
+        assert not cards.and_(six.page.locator(f"[data-id={name}]")).count()
     assert not six.errors
 
 

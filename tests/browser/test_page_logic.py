@@ -12,6 +12,8 @@ from playwright.sync_api import Browser, Page
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import TaughtPose, taught
 from katana450.extensions.recording.playback.run import Span, at_place, place_of
+from katana450.maths.collision.clearance import MIN_CLEARANCE
+from katana450.resources import STATIC
 from tests.browser.bare_page import bare_page, load, module
 
 
@@ -337,7 +339,7 @@ FEEL = """({ Rumble }, states, haptic) => {
 def state(*reasons: str, **values: Any) -> dict[str, Any]:
     """Return the part of a state that is felt: an arm that moves freely, with changes."""
     force = values.pop("force", 0.0)
-    touch = {"force_limit": 10.0, "pads": [{"force": force}, {"force": force}]}
+    touch = {"force_limit": 10.0, "fingers": [{"force": force}, {"force": force}]}
     margins = {"clearance": values.pop("clearance", 0.1), "limit": values.pop("limit", 1.0)}
     findings = [{"reason": reason} for reason in reasons]
     return {
@@ -374,6 +376,11 @@ def test_each_event_is_felt_on_its_motor_and_on_the_phone(page: Page) -> None:
         # The one motor of a gamepad in Firefox has the stronger of both.
         (haptic, _) = module(page, "touch/rumble.js", FEEL, [state(), event], True)
         assert haptic == {"value": strength, "duration": gamepad["duration"]}, name
+
+
+def test_rumble_knows_the_distance_at_which_the_arm_stops() -> None:
+    rumble = (STATIC / "touch" / "rumble.js").read_text(encoding="utf-8")
+    assert f"const MIN_CLEARANCE = {MIN_CLEARANCE:g};" in rumble
 
 
 # Teach
@@ -468,7 +475,7 @@ def test_changes_of_taught_poses_are_undone_and_done_again(page: Page) -> None:
 CATALOGUE = [
     {"id": "speed", "sizes": ["small", "large"], "shown": True},
     {"id": "clearance", "sizes": ["small"], "shown": True},
-    {"id": "pads", "sizes": ["small"], "shown": False},
+    {"id": "grip-forces", "sizes": ["small"], "shown": False},
 ]
 
 SPEED = {"id": "speed", "size": "small", "shown": True}

@@ -20,11 +20,11 @@ from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
 from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import ToolLine
-from katana450.maths.geometry import se3
+from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.tool import ToolTarget
-from tests.ticks import rested
+from tests.ticks import rested, settled
 
 OPEN = 0.3
 PITCH = np.deg2rad(40.0)
@@ -91,13 +91,14 @@ def test_closed_fingers_hold_the_cup_in_place(session: Session, holding: State) 
     assert let_go is not None
     x = np.append(holding.q, holding.gripper)
     for finger in ("finger_left_link", "finger_right_link"):
-        assert 0.0 <= let_go.gap(x, finger, "cup") <= 0.003
+        assert -7e-4 <= let_go.gap(x, finger, "cup") <= 0.003
     (stood,) = (
         scene_object.T
         for scene_object in scene_objects_of(load_props())
         if scene_object.name == "cup"
     )
-    np.testing.assert_allclose(T, stood, rtol=0, atol=1e-12)
+    # Two fingers that close at the same time push it aside by micrometres.
+    np.testing.assert_allclose(T, stood, rtol=0, atol=1e-3)
     assert holding.status.value == "ok"
 
 
@@ -118,8 +119,9 @@ def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
     up = lifted(session, arm, holding, 0.12)
     _, T = cup_of(session, holding)
     _, T_up = cup_of(session, up)
-    np.testing.assert_allclose(T_up[:3, :3], T[:3, :3], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(T_up[:3, 3] - T[:3, 3], (0.0, 0.0, 0.12), rtol=0, atol=1e-9)
+    # Friction holds it, so it may slip by some hundredths of a millimetre.
+    np.testing.assert_allclose(T_up[:3, :3], T[:3, :3], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(T_up[:3, 3] - T[:3, 3], (0.0, 0.0, 0.12), rtol=0, atol=1e-4)
     # A move down by more than the free height: the cup meets the table, not the fingers.
     chain = arm.chain_to("grasp")
     target = ToolTarget.at(chain, up.q)
@@ -131,7 +133,7 @@ def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
     cup, T = cup_of(session, down)
     # The path down has tilted the cup a little, so an edge of its foot is lowest.
     lowest = T[2, 3] - cup.size[0] * np.sqrt(1.0 - T[2, 2] ** 2)
-    assert contact.amount == pytest.approx(lowest, abs=1e-5)
+    assert contact.amount == pytest.approx(lowest, abs=1e-4)
 
 
 def test_holding_hand_closes_no_further_and_keeps_the_cup_in_a_stop(
@@ -151,38 +153,61 @@ def test_holding_hand_closes_no_further_and_keeps_the_cup_in_a_stop(
 def test_opened_fingers_leave_the_cup_on_the_table(
     session: Session, arm: MountedArm, holding: State
 ) -> None:
-    up = lifted(session, arm, holding, 0.03)
+    up = lifted(session, arm, holding, 0.005)
     _, T_up = cup_of(session, up)
-    left = rested(session, up, cmd.Gripper(OPEN))
+    left = settled(session, rested(session, up, cmd.Gripper(OPEN)))
     cup, T = cup_of(session, left)
     assert not cup.held
     assert left.grip is None
-    np.testing.assert_allclose(T[:2, 3], T_up[:2, 3], rtol=0, atol=1e-12)
-    assert T[2, 3] == 0.0
-    np.testing.assert_allclose(T[2, :3], (0.0, 0.0, 1.0), rtol=0, atol=1e-12)
+    # A finger that still touches it while it falls takes it along a bit.
+    np.testing.assert_allclose(T[:2, 3], T_up[:2, 3], rtol=0, atol=2e-3)
+    assert abs(T[2, 3]) < 2e-5
+    np.testing.assert_allclose(T[2, :3], (0.0, 0.0, 1.0), rtol=0, atol=2e-3)
     # The arm may move away from an object between its open fingers.
     back = before_cup(session, arm, left, BEFORE)
     away = rested(session, left, cmd.Joints(back))
     np.testing.assert_allclose(away.q, back, rtol=0, atol=1e-9)
 
 
-def test_one_touching_finger_does_not_grasp_and_is_reported(
-    session: Session, state: State, arm: MountedArm
-) -> None:
+def aside(session: Session, arm: MountedArm, state: State) -> State:
+    """Return the state with the open fingers round the cup, 8 mm off its middle."""
     state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
     for back in (BEFORE, AT):
         q = before_cup(session, arm, state, back, offset=0.008)
         plan = plan_to(arm, session.world_at(state), state, q)
         state = rested(session, state, cmd.Follow(plan))
-    closed = rested(session, state, cmd.Gripper(-0.44))
-    assert not cup_of(session, closed)[0].held
+    return state
+
+
+def test_first_finger_pushes_the_cup_to_the_second(
+    session: Session, state: State, arm: MountedArm
+) -> None:
+    before = aside(session, arm, state)
+    held = rested(session, before, cmd.Gripper(-0.44))
+    assert cup_of(session, held)[0].held
+    pushed = cup_of(session, held)[1][:3, 3] - cup_of(session, before)[1][:3, 3]
+    assert np.linalg.norm(pushed) == pytest.approx(0.008, abs=1e-3)
+
+
+def test_one_finger_stops_at_what_it_cannot_push_and_is_reported(
+    session: Session, state: State, arm: MountedArm
+) -> None:
+    state = aside(session, arm, state)
+    # In place of the cup a board of 5.6 kg, whose friction on the table is 19 N.
+    T = cup_of(session, state)[1]
+    R = so3.rotation_z(float(np.arctan2(T[1, 3], T[0, 3])))
+    T = se3.from_rotation_translation(R, T[:3, 3] + R @ (0.33, 0.0, 0.0))
+    board = scene_object("board", size=(0.7, 0.04, 0.4), T=T, can_be_held=True)
+    closed = rested(session, state, cmd.Remove("cup"), cmd.PlaceObject(board), cmd.Gripper(-0.44))
+    assert closed.held is None
     (lopsided,) = (f for f in closed.findings if f.reason is Reason.LOPSIDED)
     assert lopsided.parts is not None
-    assert lopsided.parts[1] == "cup"
+    assert lopsided.parts[1] == "board"
     assert lopsided.amount > 0.003
     hand = session.environment.hand
     assert hand is not None
     assert {*touching(hand, closed), lopsided.parts[0]} == set(hand.fingers)
+    np.testing.assert_allclose(closed.objects[-1].T, T, rtol=0, atol=1e-3)
     opened = rested(session, closed, cmd.Gripper(OPEN))
     assert not any(f.reason is Reason.LOPSIDED for f in opened.findings)
     assert touching(hand, opened) == ()
@@ -202,10 +227,10 @@ def test_objects_are_replaced_by_name_and_limited_in_number(session: Session, st
     ]
     state = session.step(state, commands, 0.01)
     assert len(state.objects) == MAX_OBJECTS
-    moved = se3.from_rotation_translation(np.eye(3), (0.1, 0.4, 0.0))
+    moved = se3.from_rotation_translation(np.eye(3), (-0.1, 0.4, 0.0))
     state = session.step(state, [cmd.PlaceObject(scene_object("cup", T=moved))], 0.02)
     assert len(state.objects) == MAX_OBJECTS
-    np.testing.assert_array_equal(cup_of(session, state)[1], moved)
+    np.testing.assert_allclose(cup_of(session, state)[1], moved, rtol=0, atol=2e-5)
 
 
 def test_held_object_cannot_be_moved_or_removed(session: Session, holding: State) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.scene_objects import Attachment, SceneObject
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
@@ -33,16 +33,16 @@ def full(session: Session) -> State:
 
 
 def held_level(session: Session, state: State) -> State:
-    """Return ``full`` with the cup in the hand, upright at the grasp frame."""
+    """Return ``full`` with the cup fixed to the hand, upright at the grasp frame."""
     x = np.append(state.setpoint, state.gripper_setpoint)
     palm = session.environment.pose(replace(state.objects[0], T=np.eye(4), held=True), x)
     (cup,) = (prop for prop in state.objects if prop.name == "cup")
     T = se3.from_rotation_translation(np.eye(3), palm[:3, 3] + [0.1, 0.0, 0.0])
-    held = session.environment.taken(replace(cup, T=T), x)
+    held = session.environment.mounted(replace(cup, T=T), Attachment.HAND, x)
     objects: tuple[SceneObject, ...] = tuple(
         held if prop is cup else prop for prop in state.objects
     )
-    return ticked(session, replace(state, objects=objects, grip=0.0), cmd.Fill(200.0))
+    return ticked(session, replace(state, objects=objects), cmd.Fill(200.0))
 
 
 def test_water_at_rest_keeps_its_value(session: Session, full: State) -> None:

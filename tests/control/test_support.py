@@ -50,6 +50,12 @@ def test_object_above_the_table_is_in_the_air() -> None:
         check_carried(TABLE, (), can(at(0.3, 0.0, 0.12)))
 
 
+def test_object_may_fall_on_the_table_but_not_beside_it() -> None:
+    check_carried(TABLE, (), can(at(0.3, 0.0, 0.12)), may_fall=True)
+    with pytest.raises(InputError, match="nothing carries it there"):
+        check_carried(TABLE, (), can(at(1.5, 0.0, 0.12)), may_fall=True)
+
+
 def test_object_lying_on_its_side_stands_on_its_lowest_point() -> None:
     lying = so3.rotation_y(np.pi / 2.0)
     check_carried(TABLE, (), can(at(0.3, 0.0, 0.03, lying)))
@@ -84,15 +90,17 @@ def test_scene_with_the_cup_in_the_air_is_refused_as_a_whole() -> None:
     session.check(cmd.ReplaceScene((can(at(1.5, 0.0, 0.15)), crate(at(1.5, 0.0, 0.0)))))
 
 
-def test_detached_object_must_not_be_left_in_the_air() -> None:
+def test_detached_object_may_fall_on_the_table_but_not_beside_it() -> None:
     rules = describe_robot(Settings(), URDF_PATH, None).session
     x = rules.begin(rules.ready, 0.0, 0.0).x
     around: Environment = rules.environment
     held = around.mounted(can(at(0.3, 0.0, 0.3)), Attachment.HAND, x)
     assert held.fixed
-    check_mounted(around, (), held, Attachment.TABLE, x)
-    with pytest.raises(InputError, match=r"300\.0 mm above"):
-        check_mounted(around, (), held, Attachment.WORLD, x)
+    for to in (Attachment.TABLE, Attachment.WORLD):
+        check_mounted(around, (), held, to, x)
+    outside = around.mounted(can(at(1.5, 0.0, 0.3)), Attachment.HAND, x)
+    with pytest.raises(InputError, match="nothing carries it there"):
+        check_mounted(around, (), outside, Attachment.WORLD, x)
     camera = around.mounted(crate(at(0.3, 0.0, 0.3)), Attachment.HAND, x)
     check_mounted(around, (), camera, Attachment.WORLD, x)
     mounted = around.mounted(crate(at(0.3, 0.9, 0.3)), Attachment.HAND, x)

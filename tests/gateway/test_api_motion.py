@@ -49,6 +49,8 @@ def test_program_moves_joints_and_waits_for_their_arrival(program: Client, arm: 
     described = program.query(answers.Arm)
     assert described.touch
     assert state.touch is not None
+    fingers = [finger.finger for finger in state.touch.fingers]
+    assert fingers == ["finger_right_link", "finger_left_link"]
     assert described.joints == list(arm.chain.names)
     np.testing.assert_array_equal(described.ready, READY)
     np.testing.assert_array_equal(described.T_base_shoulder, arm.T_base_shoulder)

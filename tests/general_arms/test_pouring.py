@@ -167,12 +167,12 @@ def test_flow_that_no_tilt_gives_is_refused(name: str, tmp_path: Path) -> None:
 
 
 def test_basin_too_near_to_axis_1_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The hand moves in a plane 120 mm beside axis 1, and the basin is 100 mm from that axis."""
+    """The hand moves in a plane 120 mm beside axis 1, and the basin is 80 mm from that axis."""
     chain, gripper = HANDS["four axes"]
     M = chain.M.copy()
     M[1, 3] += 0.12
     monkeypatch.setitem(HANDS, "beside", (replace(chain, M=M), gripper))
-    monkeypatch.setitem(SETTINGS, "beside", Setting((230.0, -60.0), (-100.0, 0.0), 60.0, 100.0))
+    monkeypatch.setitem(SETTINGS, "beside", Setting((230.0, -60.0), (-80.0, 0.0), 60.0, 100.0))
     with pytest.raises(ScriptError, match="cannot be emptied into basin: it stands too near to a"):
         planned(tmp_path, "beside", "{into: basin, ml: 60}")
 

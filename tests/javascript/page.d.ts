@@ -61,9 +61,6 @@ declare namespace Page {
   /** A gamepad as Firefox has it, too. */
   interface VibratingGamepad extends Gamepad { hapticActuators?: { pulse(strength: number, duration: number): void }[]; }
 
-  interface Pad { finger: string; force: number; centre: [number, number] | null; pressure: number[]; }
-  interface Touch { squeeze: number; force_limit: number; pads: Pad[]; }
-
   interface LastEpisode { number: number; outcome: Outcome; seconds: number; missing_ticks: number; }
   type Outcome = "success" | "failure" | "unjudged" | "unfinished";
   interface EpisodesState {

@@ -48,6 +48,7 @@ declare namespace Api {
     made?: number | null; }
   interface Finding { reason: string; text: string; amount: number | null; unit: string | null; axis: number | null;
     parts: [string, string] | null; seconds: number | null; }
+  interface FingerForce { finger: string; force: number; }
   type Frame = "base" | "shoulder";
   interface Get { do: "get"; id?: number | string | null; revocations?: number | null; made?: number | null;
     node: string; field: string; more?: FieldName[]; }
@@ -150,12 +151,11 @@ declare namespace Api {
   interface State { is: "state"; id?: number | string | null; t: number; sent: number; ticket: number; q: number[];
     setpoint: number[]; qd: number[]; goal: number[]; gripper: number; gripper_goal: number; tool: string | null;
     T: number[][] | null; pitch: number | null; roll: number | null; tool_speed: number | null;
-    holding: number[] | null; margins: Margins | null; touching: string[]; touch: Page.Touch | null;
-    held: string | null; branch: string[] | null; priority: string | null; status: string; moving: boolean; why: string;
-    findings: Finding[]; detour: number | null; speed: number; holder: string | null; stopped: string | null;
-    stop: string | null; stopped_at: number | null; clearable: boolean; revocations: number; silence_profile: string;
-    age: number; participants: number; water: Water | null; arm?: MeasuredArm | null; program?: Progress | null;
-    fields?: Value[]; }
+    holding: number[] | null; margins: Margins | null; touching: string[]; touch: Touch | null; held: string | null;
+    branch: string[] | null; priority: string | null; status: string; moving: boolean; why: string; findings: Finding[];
+    detour: number | null; speed: number; holder: string | null; stopped: string | null; stop: string | null;
+    stopped_at: number | null; clearable: boolean; revocations: number; silence_profile: string; age: number;
+    participants: number; water: Water | null; arm?: MeasuredArm | null; program?: Progress | null; fields?: Value[]; }
   interface Steer { do: "steer"; id?: number | string | null; revocations?: number | null; made?: number | null;
     wait?: number | null; order: ProgramOrder; unattended?: boolean; at?: number | null; }
   interface StepTool { do: "step_tool"; by: number[]; frame?: JogFrame; id?: number | string | null;
@@ -165,6 +165,7 @@ declare namespace Api {
   interface Take { do: "take"; id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface Tool { do: "tool"; name: string; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
+  interface Touch { preload: number; force_limit: number; fingers: FingerForce[]; }
   interface Turn { do: "turn"; pitch: number; roll: number; id?: number | string | null; revocations?: number | null;
     made?: number | null; wait?: number | null; }
   interface TurnElbow { do: "turn_elbow"; by: number; id?: number | string | null; revocations?: number | null;

@@ -55,7 +55,7 @@ def played(stage: Stage, steps: str, *objects: SceneObject) -> dict[str, SceneOb
 def place(scene_object: SceneObject) -> list[float]:
     """Return x, y, z [mm] of an object, which must stand upright and free."""
     assert not scene_object.held
-    assert scene_object.T[2, 2] == pytest.approx(1.0, abs=1e-12)
+    assert scene_object.T[2, 2] == pytest.approx(1.0, abs=1e-5)
     x, y, z = (1e3 * scene_object.T[:3, 3]).tolist()
     return [x, y, z]
 
@@ -85,7 +85,8 @@ def test_stacked_object_is_grasped_so_that_it_can_be_placed(stage: Stage) -> Non
 def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
     steps = "- pick: b\n- line: {by: {z: -53}}\n- release\n- home\n"
     end = played(stage, steps, box("b", NEAR))
-    assert place(end["b"]) == pytest.approx([*NEAR, 0.0], abs=1e-6)
+    # Its contact with the table gives way by some micrometres.
+    assert place(end["b"]) == pytest.approx([*NEAR, 0.0], abs=0.05)
 
 
 @pytest.mark.cases(4)

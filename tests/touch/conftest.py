@@ -1,4 +1,4 @@
-"""The arm of the project with the cup between its fingers, and the model of its touch."""
+"""The arm of the project with the cup between its fingers."""
 
 from __future__ import annotations
 
@@ -13,14 +13,10 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import DescribedRobot, describe_robot
-from katana450.extensions.touch.touch_model import TouchModel
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.control.test_grip import AT, BEFORE, OPEN, before_cup
 from tests.ticks import rested
-from tests.view.conftest import server
-
-__all__ = ["server"]
 
 
 @pytest.fixture(scope="session")
@@ -36,14 +32,6 @@ def session(described: DescribedRobot) -> Session:
 @pytest.fixture(scope="session")
 def arm(described: DescribedRobot) -> MountedArm:
     return described.robot.require_arm()
-
-
-@pytest.fixture(scope="session")
-def model(session: Session) -> TouchModel:
-    hand = session.environment.hand
-    assert hand is not None
-    assert isinstance(hand.grip_model, TouchModel)
-    return hand.grip_model
 
 
 @pytest.fixture(scope="session")

@@ -158,11 +158,6 @@ EXTENSIONS = (
     ),
     Extension("hands", hand=f"{HERE}.hands.sides:with_sides"),
     Extension(
-        "touch",
-        hand=f"{HERE}.touch.touch_model:with_touch",
-        folder=f"{HERE}.touch.pad_patches:PadPatches",
-    ),
-    Extension(
         "leader",
         (
             CliCommand(

@@ -108,7 +108,11 @@ def water_environment(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironm
     """
     cup, basin, table = props.cup, props.basin, props.table
     return WaterEnvironment(
-        {"cup": Cup(Cylinder(cup.inner_radius, _depth(cup)), cup.floor, cup.outer_radius)},
+        {
+            "cup": Cup(
+                Cylinder(cup.inner_radius, _depth(cup)), cup.floor, cup.outer_radius, cup.mass
+            )
+        },
         Basin(
             basin_at,
             basin.floor,
@@ -116,6 +120,7 @@ def water_environment(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironm
             basin.inner_radius,
             _depth(basin),
             basin.outer_radius,
+            basin.mass,
         ),
         TableTop(table.x, table.y, -table.thickness),
     )

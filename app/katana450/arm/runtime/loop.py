@@ -127,7 +127,7 @@ class ControlLoop:
             self.record(TickRecord(before.t, t, drained.submissions, has_failed, state))
         # A state that differs only in its time is not published.
         changed = is_given or _differs(before, state)
-        self._resting = not (changed or state.moving)
+        self._resting = not (changed or state.moving or state.objects_move)
         # Only time has passed, and nothing waits for it, as a film of water does that drains.
         self._settled = self._resting and not (state.under_way or state.blocked)
         self._settled = self._settled and state.poured is before.poured

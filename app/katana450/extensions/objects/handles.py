@@ -106,7 +106,7 @@ class ObjectHandles:
         moved = replace(scene_object, T=T)
         try:
             if is_loose(moved):
-                check_carried(self._environment.table, self._seen, moved)
+                check_carried(self._environment.table, self._seen, moved, may_fall=True)
         except InputError as error:
             # The object stays at the edge, and the handle returns to it.
             if event.phase == "end":

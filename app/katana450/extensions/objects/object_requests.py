@@ -80,7 +80,7 @@ class ObjectRequests(RequestHandler):
             T = arm.environment.into_hand(T, arm.state.x)
         placed = replace(scene_object, T=T)
         if is_loose(placed) and (request.T is not None or request.near is not None):
-            check_carried(arm.environment.table, arm.state.objects, placed)
+            check_carried(arm.environment.table, arm.state.objects, placed, may_fall=True)
         return placed
 
     def _shaped(self, request: requests.Place, known: SceneObject | None) -> SceneObject:

@@ -42,7 +42,7 @@ DIGEST_DIGITS = 10
 """Length of a digest. One of 10^10 states that differ has the same digest by chance. Decimal digits
 take less room than others beside numbers."""
 
-APART = ("t", "mode", "objects")
+APART = ("t", "mode", "objects", "bodies")
 PLAIN = tuple(field.name for field in fields(State) if field.name not in APART)
 POURED = PLAIN.index("poured")
 
@@ -81,7 +81,10 @@ class Digester:
             self._of_objects = hashlib.blake2b(self._encoder.encode(state.objects)).digest()
         values = [getattr(state, name) for name in PLAIN]
         values[POURED] = poured_content(state.poured)
-        return self._encoder.encode((values, self._of_objects, _mode(state.mode)))
+        content = values, self._of_objects, _mode(state.mode)
+        # Older versions have none.
+        bodies = () if state.bodies is None else (state.bodies,)
+        return self._encoder.encode((*content, *bodies))
 
     def digest(self, state: State, content: bytes | None = None) -> str:
         """Return the digest of ``state``. ``content``: its content, if it is known."""

@@ -177,9 +177,7 @@ class _Bench:
         self._model = copy(_empty_model(geometries, vertices))
         self._data = mujoco.MjData(self._model)
         # As C expects them, because each call converts them otherwise.
-        self._addresses = tuple(
-            ctypes.c_void_p(struct._address) for struct in (self._model, self._data)
-        )
+        self._addresses = addresses(self._model, self._data)
         self._positions, self._rotations = self._data.geom_xpos, self._data.geom_xmat
         self._forget()
 
@@ -283,16 +281,27 @@ def _empty_model(count: int, vertices: int) -> Any:
     return spec.compile()
 
 
-@cache
-def _function() -> Any:
-    """Return the function of MuJoCo that measures a distance.
+def addresses(*structs: Any) -> tuple[ctypes.c_void_p, ...]:
+    """Return the addresses of structs of MuJoCo, as its functions of C expect them."""
+    return tuple(ctypes.c_void_p(struct._address) for struct in structs)
 
-    Unlike that of its Python package, it keeps the lock of the interpreter. A control loop that
-    gives it away for a microsecond may wait 5 ms for it while another thread plans.
+
+@cache
+def library() -> Any:
+    """Return the library of MuJoCo, whose functions keep the lock of the interpreter.
+
+    Those of its Python package give it away. A control loop that does so for a microsecond may wait
+    5 ms for it while another thread plans.
     """
     import mujoco
 
     file = next(file for file in files(mujoco).iterdir() if LIBRARY.fullmatch(file.name))
-    function = ctypes.PyDLL(str(file)).mj_geomDistance
+    return ctypes.PyDLL(str(file))
+
+
+@cache
+def _function() -> Any:
+    """Return the function of MuJoCo that measures a distance."""
+    function = library().mj_geomDistance
     function.restype = ctypes.c_double
     return function

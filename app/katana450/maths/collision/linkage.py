@@ -55,7 +55,7 @@ class Linkage:
         self.parent = np.array([GROUND, *(mover.parent for mover in movers)])
         self.variable = np.array([0, *(mover.variable for mover in movers)])
         self.factor = np.array([0.0, *(mover.factor for mover in movers)])
-        self._offset = np.array([0.0, *(mover.offset for mover in movers)])
+        self.offset = np.array([0.0, *(mover.offset for mover in movers)])
         self.axis = np.array([np.zeros(3), *(mover.axis for mover in movers)])
         self.sliding = np.array([n for n, mover in enumerate(movers, 1) if mover.slides], dtype=int)
         self.carries = np.zeros((m, m), dtype=bool)
@@ -64,7 +64,7 @@ class Linkage:
         ]
         # For turning joints T_parent_mover @ exp(hat(axis) angle) = A + sin angle * B + cos angle *
         # C, for sliding joints A + value * B.
-        A = np.array([np.eye(4), *(mover.T_parent_mover for mover in movers)])
+        self.T_parent_mover = A = np.array([np.eye(4), *(mover.T_parent_mover for mover in movers)])
         hats = np.zeros((m, 4, 4))
         for number, mover in enumerate(movers, 1):
             self.carries[number] = self.carries[mover.parent]
@@ -79,7 +79,7 @@ class Linkage:
 
     def poses(self, x: FloatArray) -> FloatArray:
         """Return the poses T_base_mover (m, 4, 4) of all groups at ``x`` (k,)."""
-        angles = self.factor * x[self.variable] + self._offset
+        angles = self.factor * x[self.variable] + self.offset
         fractions = np.ones((self.count, 1, 3))
         np.sin(angles, out=fractions[:, 0, 1])
         np.cos(angles, out=fractions[:, 0, 2])

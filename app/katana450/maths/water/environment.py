@@ -19,11 +19,13 @@ class Cup:
         inside: its inside.
         floor: height of its inner floor [m].
         outer_radius: radius of its outside [m].
+        mass: mass without water [kg]; 0 if it is not known.
     """
 
     inside: Cylinder
     floor: float
     outer_radius: float
+    mass: float = 0.0
 
     @property
     def mouth(self) -> float:
@@ -39,7 +41,7 @@ class Cup:
         """Return a cup of the same shape with another radius and height [m]."""
         wide, tall = outer_radius / self.outer_radius, height / self.mouth
         inside = Cylinder(wide * self.inside.radius, tall * self.inside.depth)
-        return Cup(inside, tall * self.floor, outer_radius)
+        return Cup(inside, tall * self.floor, outer_radius, wide**2 * tall * self.mass)
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ class Basin:
         floor: height of its inner floor over the foot.
         floor_radius, rim_radius, depth: dimensions of its inside.
         outer_radius: radius of its widest part.
+        mass: mass without water [kg]; 0 if it is not known.
     """
 
     at: Vector
@@ -59,6 +62,7 @@ class Basin:
     rim_radius: float
     depth: float
     outer_radius: float
+    mass: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("floor_radius", "rim_radius", "depth", "outer_radius"):

@@ -176,6 +176,34 @@ class MeasuredArm(msgspec.Struct, frozen=True, kw_only=True):
     sensors: list[float]
 
 
+class FingerForce(msgspec.Struct, frozen=True, kw_only=True):
+    """The force of a finger on objects.
+
+    Attributes:
+        finger: Name of the finger among the parts of the arm; of a single jaw, also the part of the
+            palm against which it closes.
+        force: Sum of the normal forces of its contacts [N].
+    """
+
+    finger: str
+    force: float
+
+
+class Touch(msgspec.Struct, frozen=True, kw_only=True):
+    """The forces between the fingers and objects, as the physics simulates them.
+
+    Attributes:
+        preload: How much farther than the held object the fingers are commanded to close [rad]; [m]
+            for fingers that slide, 0 with an empty hand.
+        force_limit: Greatest force of the fingers on one side of an object [N]. Assumed.
+        fingers: Force of each finger that can press on an object, in the same order in all states.
+    """
+
+    preload: float
+    force_limit: float
+    fingers: list[FingerForce]
+
+
 class State(Answer, frozen=True, kw_only=True):
     """The state of the arm.
 
@@ -202,8 +230,7 @@ class State(Answer, frozen=True, kw_only=True):
             load; null where its description states no masses.
         margins: Distances to joint limits, singularity and contact.
         touching: Fingers that touch an object that can be held.
-        touch: Forces and pressures of the gripper, see the documentation of touch; null
-            for a gripper whose pads are not known.
+        touch: Forces of the fingers; null for a hand that cannot hold objects.
         held: Object held between both sides of the hand; null with an empty hand.
         branch: Shoulder and elbow; for an arm outside the five-axis family, the words of the name
             of its branch.
@@ -250,7 +277,7 @@ class State(Answer, frozen=True, kw_only=True):
     holding: Numbers | None
     margins: Margins | None
     touching: list[str]
-    touch: dict[str, Any] | None
+    touch: Touch | None
     held: str | None
     branch: tuple[str, ...] | None
     priority: str | None
@@ -313,7 +340,7 @@ class Arm(Answer, frozen=True, kw_only=True):
         links: (n,) The link that each joint moves.
         joints_only: Reason for which no tool can be moved to a pose; empty where one can.
         freedoms: Number of numbers in ``jog`` and ``step_tool``, 5 or 6; 0 without tools.
-        touch: Whether states have ``touch``, the forces in the hand.
+        touch: Whether states have ``touch``, the forces of the fingers.
         turns_elbow: Whether ``turn_elbow``, and the seventh rate of a ``jog``, move the elbow.
     """
 

@@ -10,7 +10,7 @@ import msgspec
 
 from katana450.arm.control.commands.act import tag_of
 from katana450.arm.control.objects.environment import Hand
-from katana450.arm.control.objects.grip import touching
+from katana450.arm.control.objects.grip import FINGER_FORCE, finger_forces, touching
 from katana450.arm.control.objects.pouring import Pouring
 from katana450.arm.control.session.outcome import reason
 from katana450.arm.control.session.supervision import tracking_error
@@ -44,6 +44,7 @@ UNITS = {
     control.Reason.PITCH_CHANGED: "rad",
     control.Reason.ROLL_CHANGED: "rad",
     control.Reason.LOPSIDED: "m",
+    control.Reason.SLIDING: "N",
     control.Reason.SLIPPED: "N",
     control.Reason.NOT_AT_START: "rad",
 }
@@ -122,7 +123,6 @@ def _of_snapshot(arm: ArmHandle, snapshot: Snapshot) -> dict[str, Any]:
     """Return the fields of a state that depend on ``snapshot`` alone."""
     now, mounted = snapshot.state, arm.robot.arm
     hand = arm.environment.hand
-    model = None if hand is None else hand.grip_model
     return {
         "t": now.t,
         "ticket": snapshot.ticket,
@@ -134,7 +134,7 @@ def _of_snapshot(arm: ArmHandle, snapshot: Snapshot) -> dict[str, Any]:
         "gripper_goal": now.gripper_goal,
         "holding": None if arm.holding is None else arm.holding.tolist(),
         "touching": list(touching(hand, now)),
-        "touch": None if model is None else dict(model.report(now)),
+        "touch": None if hand is None or not hand.can_hold else touch(hand, now),
         "held": None if now.held is None else now.held.name,
         "status": now.status.value,
         "why": sentence(now),
@@ -146,6 +146,18 @@ def _of_snapshot(arm: ArmHandle, snapshot: Snapshot) -> dict[str, Any]:
         "arm": None if now.report is None else measured_arm(now, now.report),
         **(NO_TOOL if mounted is None else _of_tool(mounted, arm.margins, now)),
     }
+
+
+def touch(hand: Hand, now: control.State) -> answers.Touch:
+    """Return the forces of the fingers as a part of an answer."""
+    return answers.Touch(
+        preload=now.squeeze,
+        force_limit=FINGER_FORCE,
+        fingers=[
+            answers.FingerForce(finger=name, force=force)
+            for name, force in finger_forces(hand, now).items()
+        ],
+    )
 
 
 def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
@@ -241,7 +253,7 @@ def arm(robot: Robot, ready: list[float], hand: Hand | None) -> answers.Arm:
         links=_joint_links(robot, names),
         joints_only=robot.why,
         freedoms=0 if mounted is None else mounted.kinematics.freedoms,
-        touch=hand is not None and hand.grip_model is not None,
+        touch=hand is not None and hand.can_hold,
         turns_elbow=mounted is not None and mounted.kinematics.turns_elbow,
     )
 

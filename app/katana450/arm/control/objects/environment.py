@@ -2,51 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
 
 import numpy as np
 
 from katana450.arm.control.objects.gripper_model import GripperModel
 from katana450.arm.control.state.scene_objects import Attachment, SceneObject
-from katana450.arm.control.state.state import State
 from katana450.caching import cached_property
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.environment import TableTop
-
-
-class GripModel(Protocol):
-    """Forces between the fingers and the object that they hold. All methods are pure."""
-
-    def overload(self, state: State) -> float | None:
-        """Return the load [N] under which the held object slides; None if the fingers hold it."""
-
-    def slid(self, state: State, dt: float) -> SceneObject | None:
-        """Return the held object after it has slid for ``dt`` [s]; None if it leaves the fingers.
-
-        ``state`` has an overload.
-        """
-
-    def report(self, state: State) -> Mapping[str, Any]:
-        """Return forces, pressures and sensor values of ``state`` for the answer to a query."""
-
-
-class FixedJawModel(Protocol):
-    """A fixed jaw, against which the moving jaw pushes objects. Its method is pure."""
-
-    def met(
-        self, world: CollisionWorld, state: State, item: SceneObject
-    ) -> tuple[str, float, SceneObject | None]:
-        """Return the name of the fixed jaw, its distance [m] from ``item``, and the pushed object.
-
-        ``item`` touches the moving jaw. The pushed object is in the base frame, nearer to the fixed
-        jaw. It is None if it touches the jaw already, is not before its face, or cannot be pushed:
-        uphill, or into another object.
-        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +28,7 @@ class Hand:
         T_palm_tool: (4, 4) the frame of the default tool in the frame of the palm.
         gripper: the finger joint.
         sides: names of the fingers on each side of an object, those at the tips first.
-        fixed_jaw: the body of the palm against which a single side closes; None for two.
-        grip_model: the forces in the hand; None if they are not modelled, and objects never slip.
+        fixed_jaw: names of the parts of the palm against which a single side closes.
     """
 
     palm: int
@@ -69,13 +36,17 @@ class Hand:
     T_palm_tool: FloatArray
     gripper: GripperModel
     sides: tuple[tuple[str, ...], ...]
-    fixed_jaw: FixedJawModel | None = None
-    grip_model: GripModel | None = None
+    fixed_jaw: tuple[str, ...] = ()
 
     @property
     def can_hold(self) -> bool:
         """True if it has two sides, between which objects are held."""
-        return len(self.sides) + (self.fixed_jaw is not None) >= 2
+        return len(self.gripping_sides) >= 2
+
+    @property
+    def gripping_sides(self) -> tuple[tuple[str, ...], ...]:
+        """Names of the parts on each side of an object, also of a jaw that is fixed."""
+        return tuple(side for side in (*self.sides, self.fixed_jaw) if side)
 
 
 class Environment:
@@ -94,6 +65,11 @@ class Environment:
         self._world = world
         self.hand = hand
         self.table = table
+
+    @property
+    def bodies(self) -> CollisionWorld | None:
+        """The arm and all fixed bodies without objects; None if contacts are not checked."""
+        return self._world
 
     @cached_property
     def table_height(self) -> float:
@@ -126,7 +102,10 @@ class Environment:
         return world
 
     def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
-        """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m]."""
+        """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m].
+
+        They touch and push what they can hold, so these pairs have no minimum.
+        """
         holdable = {
             scene_object.name
             for scene_object in objects
@@ -138,7 +117,7 @@ class Environment:
             bool({names[a], names[b]} & holdable and {names[a], names[b]} & fingers)
             for a, b in zip(world.first.tolist(), world.second.tolist(), strict=True)
         ]
-        return np.where(touching, 0.0, MIN_CLEARANCE)
+        return np.where(touching, -np.inf, MIN_CLEARANCE)
 
     def pose(self, scene_object: SceneObject, x: FloatArray) -> FloatArray:
         """Return the pose (4, 4) of ``scene_object`` in the base frame.
@@ -184,6 +163,14 @@ class Environment:
         place = (T[0, 3], T[1, 3], height)
         T = se3.from_rotation_translation(so3.rotation_z(yaw), place)
         return replace(scene_object, T=T, held=False, fixed=False)
+
+    def tool_point(self, x: FloatArray) -> FloatArray:
+        """Return the point (3,) in the base frame where the fingers close [m].
+
+        x: (k,) joints and finger joint [rad].
+        """
+        assert self.hand is not None
+        return np.asarray((self._palm(x) @ self.hand.T_palm_tool)[:3, 3])
 
     def _palm(self, x: FloatArray) -> FloatArray:
         assert self._world is not None

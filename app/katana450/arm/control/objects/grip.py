@@ -1,110 +1,158 @@
-"""Contact of the fingers: an object between both is held, until they open or it slides out."""
+"""Grip of the fingers: they close on an object, hold it, lose it or let it go."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from katana450.arm.control.objects.environment import Environment, Hand
-from katana450.arm.control.objects.support import surface_below
 from katana450.arm.control.session.goals import without_finding
-from katana450.arm.control.state.scene_objects import SceneObject, placed
+from katana450.arm.control.state.scene_objects import SceneObject, named, placed
 from katana450.arm.control.state.state import Finding, Reason, State
-from katana450.maths.collision.world import CollisionWorld
+from katana450.maths.physics.body import FingerContact
 
-TOUCH_DISTANCE = 3e-4
-"""[m] Distance up to which a finger touches: the sensors in the pads yield by as much."""
+FINGER_FORCE = 10.0
+"""[N] Greatest force of the fingers of one side. Assumed, as the current of a small motor allows.
+"""
 
-CENTRING_DISTANCE = 3e-3
-"""[m] Distance of the second finger up to which the object slides to the middle when the first
-finger touches it."""
+FIRM = 0.1
+"""[N] Force from which a finger counts as touching."""
+
+STALL_RATIO = 0.02
+"""[1] Speed of fingers that an object has stopped, as a ratio to their maximum speed."""
+
+SLIDING_SPEED = 0.02
+"""[m/s] Speed in the hand from which a held object counts as sliding. When it is lifted it settles
+more slowly."""
 
 RELEASE_TURN, RELEASE_SLIDE = 0.02, 1e-3
 """[rad, m] Opening of the fingers from which on an object is free: 1 mm at the pads."""
 
 
-def gripped(
-    environment: Environment, world: CollisionWorld | None, state: State, dt: float
-) -> State:
-    """Return ``state`` after the motion of the fingers in this tick of ``dt`` [s]."""
+def gripped(environment: Environment, before: State, state: State, dt: float) -> State:
+    """Return ``state`` after fingers and objects have moved in this tick of ``dt`` [s].
+
+    ``before`` is the state after the last tick.
+    """
     hand = environment.hand
-    if world is None or hand is None or not (hand.can_hold and state.objects):
+    if hand is None or not (hand.can_hold and state.objects) or dt <= 0.0:
         return state
     gripper = hand.gripper
-    if (grip := state.grip) is not None:
-        free = gripper.wider(grip, RELEASE_SLIDE if gripper.slides else RELEASE_TURN)
-        if gripper.is_wider(state.gripper_setpoint, free):
-            return _let_go(environment, state)
-        if any(finding.reason is Reason.SLIDING for finding in state.findings):
-            state = without_finding(state, Reason.SLIDING)
-        # Fingers that open to let the object go need no force.
-        opening = gripper.is_wider(state.gripper_goal, free)
-        load = None if opening or hand.grip_model is None else hand.grip_model.overload(state)
-        if load is None or state.held is None or hand.grip_model is None:
-            return state
-        held, slid = state.held, hand.grip_model.slid(state, dt)
-        reason = Reason.SLIPPED if slid is None else Reason.SLIDING
-        cause = Finding(reason, load, parts=(held.name, hand.fingers[0]))
-        if slid is None:
-            state = _let_go(environment, state)
-        else:
-            objects = tuple(slid if other is held else other for other in state.objects)
-            state = replace(state, objects=objects)
-        return replace(state, findings=(cause, *state.findings))
+    if state.grip is not None:
+        return _holding(environment, hand, before, state, dt)
     if not gripper.is_wider(state.gripper_setpoint, state.gripper_goal):
         opening = gripper.is_wider(state.gripper_goal, state.gripper)
         return without_finding(state, Reason.LOPSIDED) if opening else state
-    x = state.x_setpoint
+    moved = abs(state.gripper_setpoint - before.gripper_setpoint)
+    contacts = contacts_of(state)
+    if not contacts or moved > STALL_RATIO * gripper.speed * dt:
+        return state
     for scene_object in state.objects:
         if scene_object.can_be_held and not scene_object.fixed:
-            felt = {side[0]: world.gap(x, scene_object.name, *side) for side in hand.sides}
-            if min(felt.values()) <= TOUCH_DISTANCE:
-                if (jaw := hand.fixed_jaw) is not None:
-                    name, felt[name], moved = jaw.met(world, state, scene_object)
-                    if moved is not None:
-                        return replace(state, objects=placed(state.objects, moved), blocked=False)
-                return _closed(environment, state, scene_object, felt)
+            forces = side_forces(hand, contacts, scene_object.name)
+            if max(forces) >= FIRM:
+                return _closed(environment, hand, state, scene_object, forces)
     return state
 
 
+def contacts_of(state: State) -> tuple[FingerContact, ...]:
+    """Return the contacts of the hand."""
+    return () if state.bodies is None else state.bodies.contacts
+
+
+def side_forces(hand: Hand, contacts: tuple[FingerContact, ...], name: str) -> list[float]:
+    """Return the normal force of each gripping side of ``hand`` on the object ``name`` [N]."""
+    return [
+        sum(
+            contact.force for contact in contacts if contact.body == name and contact.finger in side
+        )
+        for side in hand.gripping_sides
+    ]
+
+
+def _holding(environment: Environment, hand: Hand, before: State, state: State, dt: float) -> State:
+    """Return ``state`` with the object still held, let go, or lost."""
+    gripper, grip, held = hand.gripper, state.grip, state.held
+    assert grip is not None
+    free = gripper.wider(grip, RELEASE_SLIDE if gripper.slides else RELEASE_TURN)
+    if held is None or gripper.is_wider(state.gripper_setpoint, free):
+        return _let_go(environment, state)
+    state = without_finding(state, Reason.SLIDING)
+    # Fingers that open to let the object go need no force.
+    if state.bodies is None or gripper.is_wider(state.gripper_goal, free):
+        return state
+    last = named(before.objects, held.name)
+    load = sum(contact.friction for contact in contacts_of(before))
+    reason = None
+    if max(side_forces(hand, state.bodies.contacts, held.name)) == 0.0:
+        if before.grip is None or not contacts_of(before):
+            # The fingers have only begun to press on it.
+            return state
+        state, reason = _let_go(environment, state), Reason.SLIPPED
+    elif last is not None and last.held and _way(last, held) > SLIDING_SPEED * dt:
+        reason = Reason.SLIDING
+    if reason is None:
+        return state
+    cause = Finding(reason, load, parts=(held.name, hand.fingers[0]))
+    return replace(state, findings=(cause, *state.findings))
+
+
+def _way(before: SceneObject, now: SceneObject) -> float:
+    """Return how far [m] a held object has moved in the hand."""
+    return 0.0 if before is now else float(abs(now.T[:3, 3] - before.T[:3, 3]).max())
+
+
+def finger_forces(hand: Hand, state: State) -> dict[str, float]:
+    """Return the normal force on objects of each part of the gripping sides of ``hand`` [N]."""
+    forces = dict.fromkeys((part for side in hand.gripping_sides for part in side), 0.0)
+    for contact in contacts_of(state):
+        if contact.finger in forces:
+            forces[contact.finger] += contact.force
+    return forces
+
+
 def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
-    """Return the fingers that touch an object, judged by the result of their closing."""
+    """Return the names of the parts of ``hand`` that touch an object."""
     if hand is None:
         return ()
-    if any(scene_object.held for scene_object in state.objects):
+    if state.held is not None and state.bodies is None:
+        # Nothing has moved since the arm's process was started again.
         return hand.fingers
-    away = [finding.parts for finding in state.findings if finding.reason is Reason.LOPSIDED]
-    near = [side for parts in away if parts for side in hand.sides if side[0] not in parts]
-    return tuple(name for side in near for name in side)
+    touched = {contact.finger for contact in contacts_of(state)}
+    return tuple(name for side in hand.gripping_sides for name in side if name in touched)
 
 
 def _let_go(environment: Environment, state: State) -> State:
-    """Return ``state`` with an empty hand and the held object below it."""
+    """Return ``state`` with an empty hand, and the held object free where it is."""
     x = state.x_setpoint
-
-    def released(held: SceneObject) -> SceneObject:
-        lifted = replace(held, T=environment.pose(held, x), held=False)
-        return environment.left(held, x, surface_below(state.objects, lifted))
-
     objects = tuple(
-        released(scene_object) if scene_object.held else scene_object
+        replace(scene_object, T=environment.pose(scene_object, x), held=False)
+        if scene_object.held
+        else scene_object
         for scene_object in state.objects
     )
     return replace(state, objects=objects, grip=None, squeeze=0.0)
 
 
 def _closed(
-    environment: Environment, state: State, scene_object: SceneObject, felt: dict[str, float]
+    environment: Environment,
+    hand: Hand,
+    state: State,
+    scene_object: SceneObject,
+    forces: list[float],
 ) -> State:
-    """Return ``state`` with the fingers closed on ``scene_object``.
+    """Return ``state`` with the fingers stopped by ``scene_object``.
 
-    The fingers stop, and they hold the object if both sides touch it. ``felt``: the distance of
-    each side from it [m].
+    They hold it if both sides press on it with ``forces`` [N].
     """
     state = without_finding(without_finding(state, Reason.CONTACT), Reason.LOPSIDED)
     stopped = replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
-    far = max(felt, key=lambda finger: felt[finger])
-    if felt[far] > CENTRING_DISTANCE:
-        lopsided = Finding(Reason.LOPSIDED, felt[far], parts=(far, scene_object.name))
+    weakest = min(range(len(forces)), key=forces.__getitem__)
+    if forces[weakest] < FIRM:
+        parts = (hand.gripping_sides[weakest][0], scene_object.name)
+        world = environment.world(state.objects)
+        assert world is not None
+        gap = world.gap(state.x_setpoint, scene_object.name, *hand.gripping_sides[weakest])
+        lopsided = Finding(Reason.LOPSIDED, gap, parts=parts)
         return replace(stopped, findings=(*stopped.findings, lopsided))
     objects = placed(state.objects, environment.taken(scene_object, state.x_setpoint))
     squeeze = abs(state.gripper_setpoint - state.gripper_goal)

@@ -14,7 +14,7 @@ from katana450.maths.water.environment import Cup, WaterEnvironment
 from katana450.maths.water.flow import VesselMove, VesselWater, Water, WaterFlow
 from katana450.maths.water.motion import Course, MotionWithWater, VesselMotion
 from katana450.maths.water.units import counted
-from katana450.maths.water.vectors import Vector, scale, sub, vector
+from katana450.maths.water.vectors import Vector, add, scale, sub, vector
 
 CUP, BASIN = "cup", "basin"
 
@@ -89,9 +89,17 @@ class Pouring:
         return self._with_vessels(MotionWithWater(settled, ()), objects, x)
 
     def step(
-        self, poured: MotionWithWater, objects: Sequence[SceneObject], x: FloatArray, dt: float
+        self,
+        poured: MotionWithWater,
+        objects: Sequence[SceneObject],
+        x: FloatArray,
+        dt: float,
+        last: Sequence[SceneObject] = (),
     ) -> MotionWithWater | None:
         """Return the water after ``dt`` [s], with the arm now at ``x`` (k,) [rad].
+
+        A slip in the hand since the ``last`` objects does not accelerate the water: the state shows
+        it in steps.
 
         Returns ``poured`` itself while vessels and water are at rest; None if there is no cup. The
         film in vessels at rest drains in steps of FILM_STEP; in between, the water stays the same.
@@ -130,8 +138,12 @@ class Pouring:
             return MotionWithWater(flow.step(water, moves, 0.0), placed)
         moves, after = {}, []
         for vessel, motion, T in motions:
-            middle = self._middle(vessel, T, objects)
-            velocity = scale(1.0 / dt, sub(middle, motion.middle))
+            middle, start = self._middle(vessel, T, objects), motion.middle
+            old = named(last, vessel.name)
+            if vessel.held and old is not None and old.held and old is not vessel:
+                unslipped = self._environment.pose(old, x)
+                start = add(start, sub(middle, self._middle(vessel, unslipped, objects)))
+            velocity = scale(1.0 / dt, sub(middle, start))
             # The velocities are those in the middle of this step and of the one before, which is
             # shorter or longer where a STOP or a late tick came between.
             between = 0.5 * (dt + (motion.course.step or dt))

@@ -32,12 +32,16 @@ def is_loose(scene_object: SceneObject) -> bool:
 
 
 def check_carried(
-    table: TableTop | None, objects: Sequence[SceneObject], scene_object: SceneObject
+    table: TableTop | None,
+    objects: Sequence[SceneObject],
+    scene_object: SceneObject,
+    *,
+    may_fall: bool = False,
 ) -> None:
     """Raise InputError, with the position and the table's extent, if an object has no support.
 
     An object is carried if its middle is over the table or over an upright object, and its
-    lowest point is on that.
+    lowest point is on that, or, if it ``may_fall``, above that.
 
     table: None if the support is not checked.
     """
@@ -47,7 +51,7 @@ def check_carried(
     tops = [other.T[2, 3] + other.height for other in objects if is_over(scene_object, other)]
     if table.x[0] <= x <= table.x[1] and table.y[0] <= y <= table.y[1]:
         tops.append(0.0)
-    if any(lowest - top <= SUPPORT_GAP for top in tops):
+    if any(may_fall or lowest - top <= SUPPORT_GAP for top in tops):
         return
     refusal = f"{scene_object.name} would be in the air at x {1e3 * x:.1f}, y {1e3 * y:.1f}"
     if tops:
@@ -78,13 +82,13 @@ def check_mounted(
     to: Attachment,
     x: FloatArray,
 ) -> None:
-    """Raise InputError if ``scene_object``, taken off the hand, would have no support.
+    """Raise InputError if nothing would be below ``scene_object``, taken off the hand.
 
     x: (k,) joints and finger joint [rad].
     """
     left = environment.mounted(scene_object, to, x)
     if to is Attachment.TABLE or is_loose(left):
-        check_carried(environment.table, objects, left)
+        check_carried(environment.table, objects, left, may_fall=True)
 
 
 def _lowest(scene_object: SceneObject) -> float:

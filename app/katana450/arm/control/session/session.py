@@ -13,6 +13,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.objects.environment import Environment, Hand
 from katana450.arm.control.objects.grip import gripped
+from katana450.arm.control.objects.loose_objects import LooseObjects
 from katana450.arm.control.objects.pouring import Pouring
 from katana450.arm.control.objects.scene_changes import with_scene_change
 from katana450.arm.control.session import tool_targets
@@ -119,6 +120,7 @@ class Session:
         self.pouring = (
             None if water_environment is None else Pouring(water_environment, self.environment)
         )
+        self._loose_objects = LooseObjects(self.environment, water_environment)
         self._robot = robot
         self._limits = robot.limits
         self._objects = objects
@@ -184,7 +186,7 @@ class Session:
             commands: each command passes ``check``; an InputError leaves ``state`` as it was.
             t: now [s], on the clock of ``state.t``.
         """
-        outcomes: list[Outcome] = []
+        before, outcomes = state, list[Outcome]()
         newest: tuple[int, State] | None = None  # that may have changed the target, and before it
         for command in commands:
             self.check(command)
@@ -206,10 +208,12 @@ class Session:
         if state.mode is IDLE and state.motion.at_rest and state.goal is not state.setpoint:
             # A brake can end one rounding beside its predicted end.
             state = replace(state, goal=state.setpoint)
-        state = gripped(self.environment, self.world_at(state), state, dt)
+        state = self._loose_objects.step(before, state, dt)
+        state = gripped(self.environment, before, state, dt)
         if self.pouring is not None and state.poured is not None:
             x = state.x_setpoint
-            state = replace(state, poured=self.pouring.step(state.poured, state.objects, x, dt))
+            water = self.pouring.step(state.poured, state.objects, x, dt, before.objects)
+            state = replace(state, poured=water)
         if not isinstance(state.intent, Jogging):
             return state
         rest = self._stepper(state).stopping_point(state)[0]

@@ -33,6 +33,7 @@ from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
+from katana450.maths.physics.body import BodyMotion
 from katana450.maths.planning.plan import Plan
 from katana450.maths.water.motion import MotionWithWater
 
@@ -222,6 +223,8 @@ class State:
         squeeze: the angle by which the commanded finger joint lies beyond ``grip``, not negative
             [rad or m]; 0 with an empty hand.
         poured: the water of the cup; None if there is none.
+        bodies: the motion of the loose objects, with the forces of the fingers; None while all of
+            them are at rest and the fingers touch none.
         appearance: how links and objects are drawn.
         report: the report of the driver; None for an arm that follows its setpoints exactly.
         astray_since: time since which the tracking error is too large [s]; None if it is not.
@@ -249,6 +252,7 @@ class State:
     grip: float | None = None
     squeeze: float = 0.0
     poured: MotionWithWater | None = None
+    bodies: BodyMotion | None = None
     appearance: Appearance = ALL_AS_MADE
     report: ArmReport | None = None
     astray_since: float | None = None
@@ -357,6 +361,11 @@ class State:
             return True
         resting = self.blocked or self.paused or self.stopped is not None
         return self.under_way and not (resting and self.motion.at_rest)
+
+    @property
+    def objects_move(self) -> bool:
+        """True if a loose object moves, which may be too little to be shown."""
+        return self.bodies is not None and not self.bodies.resting.all()
 
     @property
     def setpoint(self) -> FloatArray:

@@ -194,7 +194,7 @@ class VrmlNodes(Nodes):
         for name in {order.name for order in moves}:
             scene_object = next(candidate for candidate in objects if candidate.name == name)
             if is_loose(scene_object):
-                check_carried(self._surroundings.table, objects, scene_object)
+                check_carried(self._surroundings.table, objects, scene_object, may_fall=True)
 
     def _field(self, state: State, node: str, field: str) -> NamedField:
         named = self._nodes(state).get(node)

@@ -278,7 +278,7 @@ class PlanState:
             state = session.step(state, commands, state.t + TICK)
             state = session.observe(state, state.setpoint, state.gripper_setpoint)
             commands = ()
-            if not state.moving:
+            if not (state.moving or state.objects_move):
                 break
         return state
 

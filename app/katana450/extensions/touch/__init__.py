@@ -1,1 +1,0 @@
-"""Touch of the gripper: pressures on its pads, and slip."""

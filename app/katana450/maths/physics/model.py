@@ -1,0 +1,317 @@
+"""The model of MuJoCo for one arm and the free bodies around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from katana450.maths.collision.engine import KINDS
+from katana450.maths.collision.linkage import GROUND, Linkage
+from katana450.maths.collision.shape import CollisionShape
+from katana450.maths.collision.world import Part
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.physics.body import RigidBody, volume
+from katana450.maths.water.units import GRAVITY
+
+STEP = 1e-3
+"""[s] Longest step of the engine. The contacts are as stiff as it allows."""
+
+CONTACT_TIME, CONTACT_DAMPING = 2 * STEP, 4.0
+"""[s, 1] Time in which bodies in contact lose their speed, and ratio of the critical damping. With
+less damping they bounce, because a contact cannot pull."""
+
+CONTACT_STIFFNESS = (0.99, 0.999, 1e-4, 0.5, 2.0)
+"""[1, 1, m, 1, 1] How hard a contact is: the fraction of its force that needs no motion of the
+bodies, at their surface and from the depth of the third number on (solimp)."""
+
+SLIP_STEPS = 3
+"""Number of steps that take the rest of creeping out of contacts that hold."""
+
+LINK_MASS = 1e5
+"""[kg, kg m^2] Mass and inertia of the links and of bodies at rest: a contact of a tick does not
+move them. With greater numbers the engine's matrices lose their digits."""
+
+MEMORY = 1 << 26
+"""[bytes] Memory for contacts. Those of a heap that needs more are left out."""
+
+LINK_FRICTION = 0.35
+"""[1] Coefficient of friction of links and of what stands still. Assumed."""
+
+SPIN_FRICTION, ROLLING_FRICTION = 5e-3, 2e-5
+"""[m] Friction against turning about the normal of a contact, and against rolling. Assumed."""
+
+LINK, BODY = 1, 2
+"""Bits of what meets what: bodies meet everything, and links meet only them."""
+
+SLIDING, SPINNING, ROLLING = 3, 4, 6
+"""Numbers of directions in which a contact of a flat piece, a finger and a round piece resists
+(condim)."""
+
+
+FINGER_INERTIA, FINGER_MASS = 3e-3, 0.3
+"""[kg m^2, kg] Inertia of the drive at a finger that turns, and at one that slides. Assumed."""
+
+COUPLING = (0.99, 0.999, 1e-4, 0.5, 2.0)
+"""How hard the fingers are coupled to each other, as CONTACT_STIFFNESS."""
+
+PAD_FRICTION, PAD_SPIN = 0.8, 0.01
+"""[1, m] Coefficient of friction of the fingers, rubber on smooth plastic, and their friction
+against turning, that of a soft pad of 20 by 30 mm. Assumed."""
+
+
+class FingerDrive(NamedTuple):
+    """The drive of the fingers: a spring between the finger joint and its goal.
+
+    Attributes:
+        variable: index of the finger joint in x.
+        stiffness: [N m/rad or N/m].
+        force_limit: greatest force of the drive, seen at the finger joint [N m or N].
+        palm, grasp_point: the rigid group that carries the fingers, and the point (3,) in its frame
+            where they close [m]. What is held there follows each step of the palm exactly; at a
+            distance r from it, it would drift outwards by r w^2 h / 2 in each second, with the turn
+            w of the palm and the step h.
+    """
+
+    variable: int
+    stiffness: float
+    force_limit: float
+    palm: int
+    grasp_point: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A compiled model. Its bodies are the free ones, then the links, then the fingers.
+
+    Attributes:
+        compiled: MuJoCo's model.
+        links: the rigid groups of the arm that are moved from outside.
+        origins: (m, 3) origin of the frame of each of these links in that of its group [m].
+        fingers: the rigid groups that the drive moves.
+        owners: names of the parts and bodies by the numbers of their geometries.
+    """
+
+    compiled: Any
+    links: tuple[int, ...]
+    origins: FloatArray
+    fingers: tuple[int, ...]
+    owners: tuple[str, ...]
+
+
+def compile_model(
+    linkage: Linkage,
+    parts: Sequence[Part],
+    bodies: Sequence[RigidBody],
+    drive: FingerDrive | None = None,
+) -> Model:
+    """Return the model of free ``bodies`` among the ``parts`` of the arm and its environment.
+
+    Parts on the ground stand still. The groups of the ``drive`` are moved by it, all others of the
+    ``linkage`` from outside.
+    """
+    import mujoco
+
+    spec = mujoco.MjSpec()
+    option, spec.memory = spec.option, MEMORY
+    option.timestep, option.gravity = STEP, (0.0, 0.0, -GRAVITY)
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # A motion that is not finite is seen, where the engine would put all bodies at the origin.
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    option.noslip_iterations = SLIP_STEPS
+    builder = _Builder(spec)
+    for body in bodies:
+        frame = spec.worldbody.add_body()
+        frame.add_freejoint()
+        builder.add_body(frame, body)
+    frames = {GROUND: spec.worldbody}
+    variable = None if drive is None else drive.variable
+    fingers = tuple(g for g in range(1, linkage.count) if linkage.variable[g] == variable)
+    moved = {part.mover for part in parts} | {int(linkage.parent[group]) for group in fingers}
+    links = tuple(sorted(moved - {GROUND, *fingers}))
+    origins = np.zeros((linkage.count, 3))
+    if drive is not None:
+        origins[drive.palm] = drive.grasp_point
+    origins[GROUND] = 0.0
+    for group in links:
+        frames[group] = frame = spec.worldbody.add_body()
+        frame.add_freejoint()
+        frame.mass, frame.inertia, frame.explicitinertial = LINK_MASS, (LINK_MASS,) * 3, True
+        frame.gravcomp = 1.0
+    for group in fingers:
+        parent = int(linkage.parent[group])
+        T = _shifted(linkage.T_parent_mover[group], origins[parent])
+        frames[group] = builder.add_finger(frames[parent], linkage, group, T)
+    if drive is not None and fingers:
+        builder.add_drive(linkage, fingers, drive)
+    # A jaw of the palm holds as a finger does.
+    hand = {*fingers, *(() if drive is None else (drive.palm,))} - {GROUND}
+    for part in parts:
+        places = tuple(_shifted(T, origins[part.mover]) for T in part.T_mover_shape)
+        shifted = replace(part, T_mover_shape=places)
+        builder.add_part(frames[part.mover], shifted, is_hand=part.mover in hand)
+    compiled = spec.compile()
+    owners = builder.set_meetings(compiled)
+    return Model(compiled, links, frozen(origins[list(links)]), fingers, owners)
+
+
+class _Builder:
+    """Adds geometries to a specification, and remembers what each of them meets."""
+
+    def __init__(self, spec: Any) -> None:
+        self._spec = spec
+        self._bits: list[tuple[int, int]] = []
+        self._owners: list[str] = []
+        self._joints: dict[int, Any] = {}
+        self._meshes: dict[tuple[bytes, bool], str] = {}
+
+    def add_finger(self, parent: Any, linkage: Linkage, group: int, T: FloatArray) -> Any:
+        """Return a finger on its ``parent``, with the joint of its ``group``.
+
+        T: (4, 4) its frame at zero in that of the parent.
+        """
+        import mujoco
+
+        slides = group in linkage.sliding
+        frame = parent.add_body(pos=T[:3, 3], quat=so3.to_quaternion(T[:3, :3]))
+        frame.mass, frame.inertia, frame.explicitinertial = 1e-3, (1e-6,) * 3, True
+        frame.gravcomp = 1.0
+        self._joints[group] = frame.add_joint(
+            name=_joint(group),
+            type=mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE,
+            axis=linkage.axis[group],
+            armature=FINGER_MASS if slides else FINGER_INERTIA,
+        )
+        return frame
+
+    def add_drive(self, linkage: Linkage, fingers: Sequence[int], drive: FingerDrive) -> None:
+        """Let the first finger be driven, and the others follow it."""
+        import mujoco
+
+        first = fingers[0]
+        for group in fingers[1:]:
+            ratio = float(linkage.factor[group] / linkage.factor[first])
+            coupling = self._spec.add_equality(
+                type=mujoco.mjtEq.mjEQ_JOINT, name1=_joint(group), name2=_joint(first)
+            )
+            offset = float(linkage.offset[group] - ratio * linkage.offset[first])
+            coupling.data[:5] = offset, ratio, 0.0, 0.0, 0.0
+            coupling.solref[:2] = CONTACT_TIME, 1.0
+            coupling.solimp[:5] = COUPLING
+        # Seen at the first finger, whose joint moves by a factor of the finger joint.
+        factor = abs(float(linkage.factor[first]))
+        stiffness = drive.stiffness / factor**2
+        inertia = FINGER_MASS if first in linkage.sliding else FINGER_INERTIA
+        # In the joints, because a drive at its greatest force has no damping of its own.
+        for group in fingers:
+            self._joints[group].damping[0] = 2.0 * np.sqrt(stiffness * inertia / len(fingers))
+        motor = self._spec.add_actuator(target=_joint(first))
+        motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        motor.gaintype, motor.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+        motor.gainprm[0] = stiffness
+        motor.biasprm[1] = -stiffness
+        limit = drive.force_limit / factor
+        motor.forcelimited, motor.forcerange = True, (-limit, limit)
+
+    def add_part(self, frame: Any, part: Part, *, is_hand: bool) -> None:
+        bits = (BODY if part.mover == GROUND else LINK, 0)
+        friction = (PAD_FRICTION, PAD_SPIN) if is_hand else (LINK_FRICTION, SPIN_FRICTION)
+        for T, shape in zip(part.T_mover_shape, part.shapes, strict=True):
+            # Contacts of a face have several points only with the faces of its hull.
+            self._add(frame, T, shape, friction, bits, solid=is_hand).mass = 0.0
+            self._owners.append(part.name)
+
+    def add_body(self, frame: Any, body: RigidBody) -> None:
+        volumes = [volume(shape) for shape in body.shapes]
+        for T, shape, size in zip(body.T_body_shape, body.shapes, volumes, strict=True):
+            friction = body.friction, SPIN_FRICTION
+            geom = self._add(frame, T, shape, friction, (BODY, LINK | BODY), solid=True)
+            geom.mass = body.mass * size / sum(volumes)
+            self._owners.append(body.name)
+
+    def _add(
+        self,
+        frame: Any,
+        T: FloatArray,
+        shape: CollisionShape,
+        friction: tuple[float, float],
+        bits: tuple[int, int],
+        *,
+        solid: bool = False,
+    ) -> Any:
+        import mujoco
+
+        kind = shape.geometry.kind
+        dimensions = SPINNING if friction[1] == PAD_SPIN else SLIDING
+        if bits[1] and kind in ("sphere", "cylinder"):
+            dimensions = ROLLING
+        geom = frame.add_geom(
+            name=str(len(self._bits)),
+            type=mujoco.mjtGeom(KINDS[kind]),
+            pos=T[:3, :3] @ shape.middle + T[:3, 3],
+            quat=so3.to_quaternion(T[:3, :3]),
+            # Set after the compilation, which makes the hull of each mesh that can meet another.
+            contype=0,
+            conaffinity=0,
+            condim=dimensions,
+            friction=(*friction, ROLLING_FRICTION),
+        )
+        geom.solref[:2] = CONTACT_TIME, CONTACT_DAMPING
+        geom.solimp[:5] = CONTACT_STIFFNESS
+        self._bits.append(bits)
+        if kind == "hull":
+            geom.meshname = self._mesh(shape, solid=solid)
+        else:
+            geom.size = (0.0, 0.0, 1.0) if kind == "half-space" else shape.geometry.size
+        return geom
+
+    def _mesh(self, shape: CollisionShape, *, solid: bool) -> str:
+        """Return the name of the mesh of ``shape``; one that is not ``solid`` has no inertia."""
+        import mujoco
+
+        key = shape.mark, solid
+        if key not in self._meshes:
+            self._meshes[key] = name = f"mesh {len(self._meshes)}"
+            vertices = shape.geometry.vertices
+            mesh = self._spec.add_mesh(name=name, uservert=vertices.ravel())
+            if not solid:
+                # Without the hull the compilation takes a twentieth of the time.
+                mesh.userface = _triangle(vertices)
+                mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        return self._meshes[key]
+
+    def set_meetings(self, compiled: Any) -> tuple[str, ...]:
+        """Set what each geometry of the ``compiled`` model meets; return whose each is."""
+        owners = [""] * len(self._bits)
+        for number, (kind, meets) in enumerate(self._bits):
+            geom = compiled.geom(str(number)).id
+            body = compiled.geom_bodyid[geom]
+            compiled.geom_contype[geom], compiled.geom_conaffinity[geom] = kind, meets
+            compiled.body_contype[body] |= kind
+            compiled.body_conaffinity[body] |= meets
+            owners[geom] = self._owners[number]
+        return tuple(owners)
+
+
+def _shifted(T: FloatArray, origin: FloatArray) -> FloatArray:
+    """Return the pose ``T`` (4, 4) seen from ``origin`` (3,)."""
+    shifted = T.copy()
+    shifted[:3, 3] -= origin
+    return shifted
+
+
+def _joint(group: int) -> str:
+    return f"joint {group}"
+
+
+def _triangle(vertices: FloatArray) -> Any:
+    """Return both sides (6,) of a large triangle of ``vertices`` (n, 3), as their indices."""
+    edges = vertices - vertices[0]
+    second = int(np.einsum("ij,ij->i", edges, edges).argmax())
+    normals = np.cross(edges, edges[second])
+    third = int(np.einsum("ij,ij->i", normals, normals).argmax())
+    return np.array((0, second, third, 0, third, second))

@@ -1,0 +1,174 @@
+"""Loose objects of the app's own session: they fall, come to rest, and wake."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.pouring import CUP
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import State
+from katana450.assembly.robot_session import describe_robot
+from katana450.maths.geometry import so3
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+from tests.physics.scenes import pose
+from tests.ticks import during, states, ticked
+
+SIDE = 0.04  # m
+SHOWN = 1e-3  # m
+
+
+@pytest.fixture(scope="module")
+def session() -> Session:
+    return describe_robot(Settings(), URDF_PATH, None).session
+
+
+@pytest.fixture
+def state(session: Session) -> State:
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+def block(name: str, x: float, y: float, z: float = 0.0, size: float = SIDE) -> SceneObject:
+    """Return a box of equal sides, ``z`` [m] above the table."""
+    return SceneObject(name, Shape.BOX, (size, size, size), pose(x, y, z), can_be_held=True)
+
+
+def ball(name: str, x: float, y: float, z: float, radius: float = 0.012) -> SceneObject:
+    return SceneObject(name, Shape.SPHERE, (radius,), pose(x, y, z), can_be_held=True)
+
+
+def with_objects(state: State, *objects: SceneObject) -> tuple[cmd.Command, ...]:
+    """Return the commands that add ``objects`` on the table and move them to their places."""
+    standing = [
+        replace(scene_object, T=pose(0.6, -0.6 + 0.02 * number, 0.0))
+        for number, scene_object in enumerate(objects)
+    ]
+    scene = cmd.ReplaceScene((*state.objects, *standing))
+    return scene, *(
+        cmd.MoveObject(item.name, position=item.T[:3, 3], R=item.T[:3, :3]) for item in objects
+    )
+
+
+def named(state: State, name: str) -> SceneObject:
+    return next(scene_object for scene_object in state.objects if scene_object.name == name)
+
+
+def rested(session: Session, state: State, *commands: cmd.Command) -> State:
+    """Return the state in which all objects rest, after ``commands``."""
+    for number, after in enumerate(islice(states(session, state, *commands), 400)):
+        if after.bodies is None:
+            assert number > 1, "Nothing moves."
+            return after
+    raise AssertionError("The objects do not come to rest.")
+
+
+def test_objects_in_the_air_fall_and_come_to_rest(session: Session, state: State) -> None:
+    tilted = replace(block("tilted", 0.4, 0.1), T=pose(0.4, 0.1, 0.2, so3.rotation_x(0.4)))
+    can = SceneObject("can", Shape.CYLINDER, (0.02, 0.06), pose(0.45, 0.0, 0.1), can_be_held=True)
+    after = rested(
+        session, state, *with_objects(state, block("block", 0.4, 0.0, 0.15), tilted, can)
+    )
+    for name, x in (("block", 0.4), ("can", 0.45)):
+        np.testing.assert_allclose(named(after, name).T, pose(x, 0.0, 0.0), rtol=0, atol=SHOWN)
+    T = named(after, "tilted").T_collision_shape
+    assert T[2, 3] == pytest.approx(0.5 * SIDE, abs=SHOWN)
+    # A face is below.
+    assert np.abs(T[2, :3]).max() == pytest.approx(1.0, abs=1e-3)
+
+
+def test_fixed_and_not_loose_objects_stay_in_the_air(session: Session, state: State) -> None:
+    shelf = replace(block("shelf", 0.4, 0.0, 0.2), can_be_held=False)
+    passed = during(session, state, 0.5, *with_objects(state, shelf))
+    assert (named(passed[-1], "shelf").T == shelf.T).all()
+
+
+def test_object_falls_onto_a_part_of_the_work_cell(session: Session, state: State) -> None:
+    shelf = replace(block("shelf", 0.4, 0.0, 0.1), can_be_held=False)
+    after = rested(session, state, *with_objects(state, shelf, block("block", 0.4, 0.0, 0.2)))
+    assert named(after, "block").T[:3, 3] == pytest.approx((0.4, 0.0, 0.1 + SIDE), abs=SHOWN)
+
+
+def test_ball_falls_into_the_cup(session: Session, state: State) -> None:
+    x, y, z = named(state, CUP).T[:3, 3]
+    after = rested(session, state, *with_objects(state, ball("ball", x + 0.004, y, z + 0.15)))
+    cup, T = named(after, CUP).T, named(after, "ball").T_collision_shape
+    assert np.hypot(*(T[:2, 3] - cup[:2, 3])) < 0.02
+    assert 0.012 <= T[2, 3] - cup[2, 3] < 0.03
+    np.testing.assert_allclose(cup, named(state, CUP).T, rtol=0, atol=5e-3)
+
+
+def test_ball_beside_the_cup_stays_outside(session: Session, state: State) -> None:
+    x, y, z = named(state, CUP).T[:3, 3]
+    passed = during(session, state, 2.0, *with_objects(state, ball("ball", x + 0.06, y, z + 0.15)))
+    cup, T = named(passed[-1], CUP).T, named(passed[-1], "ball").T_collision_shape
+    assert np.hypot(*(T[:2, 3] - cup[:2, 3])) > 0.032 + 0.012 - SHOWN
+    assert T[2, 3] == pytest.approx(0.012, abs=SHOWN)
+
+
+def test_high_box_put_on_its_edge_topples(session: Session, state: State) -> None:
+    T = pose(0.45, 0.0, 0.02, so3.rotation_y(0.5))
+    high = SceneObject("high", Shape.BOX, (0.03, 0.03, 0.12), T, can_be_held=True)
+    after = rested(session, state, *with_objects(state, high))
+    T = named(after, "high").T_collision_shape
+    assert abs(T[2, 2]) < 0.01
+    assert T[2, 3] == pytest.approx(0.015, abs=SHOWN)
+
+
+def test_object_beyond_the_table_falls_to_the_floor(session: Session, state: State) -> None:
+    table = session.environment.table
+    assert table is not None
+    after = rested(session, state, *with_objects(state, block("block", 0.3, table.y[1] + 0.05)))
+    assert named(after, "block").T[2, 3] == pytest.approx(table.floor, abs=SHOWN)
+
+
+def test_objects_at_rest_do_not_change_to_the_bit(session: Session, state: State) -> None:
+    blocks = [
+        block(f"block {n}", 0.25 + 0.06 * (n % 5), -0.15 + 0.08 * (n // 5)) for n in range(20)
+    ]
+    before = rested(session, state, *with_objects(state, *blocks))
+    assert len(before.objects) == 22
+    passed = during(session, before, 1.0)
+    assert all(after.objects is before.objects and after.bodies is None for after in passed)
+    # Also while the arm moves, with nothing in its hand.
+    moving = during(session, before, 1.0, cmd.Joints(session.ready + 0.1))
+    assert moving[-1].setpoint.tolist() != before.setpoint.tolist()
+    assert all(after.objects is before.objects and after.bodies is None for after in moving)
+
+
+def test_moved_object_wakes_only_what_is_beside_it(session: Session, state: State) -> None:
+    objects = block("near", 0.4, 0.0), block("far", 0.4, 0.3), block("moved", 0.3, 0.1)
+    before = rested(session, state, *with_objects(state, *objects))
+    move = cmd.MoveObject("moved", position=np.array((0.4, 0.01, SIDE + 0.02)))
+    passed = during(session, before, 2.0, move)
+    awake = {
+        name
+        for after in passed
+        if after.bodies is not None
+        for name, resting in zip(after.bodies.names, after.bodies.resting, strict=True)
+        if not resting
+    }
+    assert awake == {"near", "moved"}
+    assert (named(passed[-1], "far").T == named(before, "far").T).all()
+    assert named(passed[-1], "moved").T[2, 3] == pytest.approx(SIDE, abs=SHOWN)
+
+
+def test_steps_are_equal_to_the_bit_whatever_was_simulated_before(
+    session: Session, state: State
+) -> None:
+    commands = with_objects(state, block("one", 0.4, 0.0, 0.1), ball("two", 0.41, 0.0, 0.3))
+    passed = during(session, state, 0.32, *commands)
+    middle = passed[15]
+    assert middle.bodies is not None
+    # Another scene in between.
+    ticked(session, state, *with_objects(state, block("other", 0.4, 0.0, 0.1)), ticks=3)
+    again = ticked(session, middle, ticks=15)
+    assert again.bodies is not None
+    assert passed[30].bodies is not None
+    assert again.bodies.place.tobytes() == passed[30].bodies.place.tobytes()
+    assert again.bodies.memory.tobytes() == passed[30].bodies.memory.tobytes()
