@@ -20,7 +20,7 @@ from katana450.maths.collision.shape import box, cylinder
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.geometry.curve import Curve
+from katana450.maths.geometry.curve import JointCurve
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m: what the search for nearest points leaves open, many ticks together
@@ -185,7 +185,7 @@ def test_a_curve_is_clear_between_its_ends_too(sag: float, clear: bool) -> None:
     ]
     world = CollisionWorld(linkage, parts, [(0, 1)])
     start, end = np.zeros(2), np.array((0.02, 0.0))
-    curve = Curve(
+    curve = JointCurve(
         lambda part: np.array((0.02 * part, -4.0 * sag * part * (1.0 - part))),
         lambda low, high: np.array((0.0, 8.0 * sag * (high - low) ** 2)),
     )

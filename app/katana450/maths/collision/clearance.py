@@ -10,7 +10,7 @@ import numpy as np
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import PATH_LENGTH_FACTOR, CollisionWorld, PlacedWorld
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.geometry.curve import Curve
+from katana450.maths.geometry.curve import JointCurve
 
 MIN_CLEARANCE = 0.005
 """Distance [m] that the arm keeps from itself and from everything else."""
@@ -77,7 +77,7 @@ def advance(
     towards: FloatArray,
     dt: float,
     keep: FloatArray | None = None,
-    curve: Curve | None = None,
+    curve: JointCurve | None = None,
 ) -> Advance:
     """Move from ``x`` (k,) [rad or m] straight to ``towards``, as far as clearance allows.
 
@@ -285,7 +285,7 @@ class _BentPath:
     def __init__(
         self,
         world: CollisionWorld,
-        curve: Curve,
+        curve: JointCurve,
         start: tuple[FloatArray, PlacedWorld],
         end: tuple[FloatArray, PlacedWorld],
         distances: Mapping[int, float],

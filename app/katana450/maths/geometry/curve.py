@@ -11,7 +11,7 @@ from katana450.maths.geometry.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class JointCurve:
     """A curve of variables, by the fraction of it from 0 to 1.
 
     Attributes:
@@ -24,22 +24,22 @@ class Curve:
     place: Callable[[float], FloatArray]
     bend: Callable[[float, float], FloatArray]
 
-    def piece(self, a: float, b: float) -> Curve:
+    def piece(self, a: float, b: float) -> JointCurve:
         """Return the part of the curve between two fractions."""
         size = b - a
-        return Curve(
+        return JointCurve(
             lambda part: self.place(b if part == 1.0 else a + part * size),
             lambda low, high: self.bend(a + low * size, a + high * size),
         )
 
-    def pieces(self, count: int) -> list[Curve]:
+    def pieces(self, count: int) -> list[JointCurve]:
         """Return the curve in ``count`` parts of equal fractions."""
         return [self.piece(number / count, (number + 1) / count) for number in range(count)]
 
-    def beside(self, others: FloatArray) -> Curve:
+    def beside(self, others: FloatArray) -> JointCurve:
         """Return the curve with ``others`` (m,), which stay as they are, after its variables."""
         still = np.zeros_like(others)
-        return Curve(
+        return JointCurve(
             lambda part: np.append(self.place(part), others),
             lambda low, high: np.append(self.bend(low, high), still),
         )

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.geometry.curve import Curve
+from katana450.maths.geometry.curve import JointCurve
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.motion.arm_angle import ElbowPath, at_pose, elbow_path, self_motion
 from katana450.maths.motion.limiter import STILL, JointMotion, Limiter, Limits
@@ -106,7 +106,7 @@ class ElbowBrake:
 
     def stopping_path(
         self, now: JointMotion, longest: float, length: Callable[[FloatArray], float]
-    ) -> list[Curve]:
+    ) -> list[JointCurve]:
         """Return the braking path to rest in pieces; see `Limiter.stopping_path`.
 
         Its bend is an estimate: twice that at its begin.
@@ -115,7 +115,7 @@ class ElbowBrake:
         along, line = _line(path, self.limits, now, STILL)
         end = float(along.stopping_point(line)[0])
         bend = 2.0 * end * end * np.abs(path.bend)
-        curve = Curve(
+        curve = JointCurve(
             lambda part: _place(self.chain, now.q, path, end * part, self.T),
             lambda low, high: (high - low) ** 2 * bend,
         )

@@ -31,7 +31,7 @@ from ruckig import (
 
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
-from katana450.maths.geometry.curve import Curve
+from katana450.maths.geometry.curve import JointCurve
 
 LINE_TOLERANCE = 1e-6
 """Fraction of the limits: a motion that deviates less from the line to its goal is on the line."""
@@ -208,7 +208,7 @@ class Limiter:
 
     def stopping_path(
         self, now: JointMotion, longest: float, length: Callable[[FloatArray], float]
-    ) -> list[Curve]:
+    ) -> list[JointCurve]:
         """Return the braking path from the present place to rest, in pieces; none at rest.
 
         In each piece the joints move by at most ``longest`` [rad]. ``length`` returns how much a
@@ -228,7 +228,7 @@ class Limiter:
             first, last = (np.abs(state_at(part * duration)[2]) for part in (low, high))
             return np.asarray(h * h * np.minimum(maximum, 0.5 * (first + last + h * jerk)))
 
-        curve = Curve(lambda part: np.array(state_at(part * duration)[0]), bend)
+        curve = JointCurve(lambda part: np.array(state_at(part * duration)[0]), bend)
         # Each joint either continues in its direction or returns to it: twice the distance is
         # enough.
         count = math.ceil(2.0 * length(curve.place(1.0) - now.q) / longest)
