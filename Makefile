@@ -155,7 +155,7 @@ lock: $(dev_ok)               ## resolve the dependencies again into the two loc
 	  --no-header pyproject.toml --group build --extra gallery --output-file requirements.lock
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
 	  --no-header pyproject.toml --group dev --extra gallery --extra datasets --extra films \
-	  --extra meshes --extra pictures --extra serial --constraint requirements.lock \
+	  --extra learn --extra meshes --extra pictures --extra serial --constraint requirements.lock \
 	  --output-file requirements-dev.lock
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
 	  --no-header --group pyproject.toml:js --output-file $(javascript)/requirements.lock

@@ -15,6 +15,7 @@ PACKAGES = {
     "films": "imageio-ffmpeg",
     "foxglove": "foxglove-sdk",
     "gallery": "robot-descriptions",
+    "learn": "gymnasium",
     "meshes": "dracopy networkx",
     "pictures": "embreex",
     "serial": "pyserial",
