@@ -7,6 +7,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
+from runpy import run_path
 
 import pytest
 
@@ -20,6 +21,9 @@ from katana450.extensions.rosbridge.serve_parts import check_installed
 from katana450.extras import MissingExtraError
 from tests.exchange.compressed_gltf import draco_glb
 from tests.exchange.test_threemf import threemf
+
+LEARN = Path(extras.__file__).with_name("learn.py")
+"""The module that registers the environments of gymnasium."""
 
 SCRIPT = """\
 frame: base
@@ -56,6 +60,7 @@ def test_each_missing_extra_is_named_with_its_command(
         ("robot_descriptions", "gallery", lambda: answered("arms")),
         ("robot_descriptions", "gallery", lambda: answered("serve", "--arm", "ur5e")),
         ("foxglove", "foxglove", lambda: refused(check_installed, *foxglove)),
+        ("gymnasium", "learn", lambda: refused(run_path, str(LEARN))),
         ("serial", "serial", lambda: refused(ArmUrl("/dev/ttyUSB0", None).open)),
         ("serial", "serial", lambda: refused(driver_of, *arm)),
         ("DracoPy", "meshes", lambda: read(draco_glb(), Format.GLB)),

@@ -1,0 +1,1 @@
+"""Environments of gymnasium, in which a policy drives the arm as a person does."""

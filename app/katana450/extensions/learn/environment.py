@@ -1,0 +1,176 @@
+"""An environment of gymnasium: the session of an arm, stepped on a simulated clock."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.grip import finger_forces
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import named
+from katana450.assembly.robot_session import describe_robot, find_arm
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.extensions.learn.tasks import TASKS, WANTED, Table
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.water.units import MILLILITRE
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+
+Numbers = npt.NDArray[np.float32]
+
+PLACE_ERROR = 0.01
+"""[m] Maximum distance of an object from its goal at success."""
+
+STEP_TICKS = 10
+"""Number of ticks in a step: 0.1 s. A jog lasts for 0.2 s."""
+
+LINEAR, ANGULAR = 0.25, 1.0
+"""[m/s, rad/s] Rates of the tool at the action 1. The linear rate is that of the page."""
+
+MAX_PLACE, MAX_FORCE, MAX_AMOUNT = 4.0, 1000.0, 1000.0
+"""[m, N, ml] Bounds of places, forces and amounts of water in an observation."""
+
+
+class TaskEnvironment(gymnasium.Env[Numbers, Numbers]):
+    """A task of one arm.
+
+    Attributes:
+        parts: the slice of each part of an observation, by its name.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (as gymnasium declares it)
+
+    def __init__(self, task: str, urdf: str | Path | None = None) -> None:
+        """Load the arm.
+
+        Args:
+            task: a key of ``TASKS``.
+            urdf: description of the arm; None for the Katana450.
+
+        Raises InputError for an unknown task or one of another arm, and RobotDescriptionError for
+        a file without an arm whose hand can hold objects.
+        """
+        if task not in TASKS:
+            raise InputError(f"There is no task {task!r}. Choose from {', '.join(TASKS)}.")
+        if urdf is not None and task == "Pour":
+            raise InputError("Pour is for the Katana450 alone. Leave `urdf` out.")
+        path = URDF_PATH if urdf is None else Path(urdf)
+        robot, self._session, _ = describe_robot(Settings(), path, None, find_arm)
+        self._arm, self._task, self._names = robot.require_arm(), task, TASKS[task]
+        hand = self._session.environment.hand
+        if hand is None or not hand.can_hold:
+            raise RobotDescriptionError(
+                f"{path.name}: This arm has no hand that can hold objects. Choose another file."
+            )
+        self._hand, self._goal = hand, np.zeros(3)
+        gripper, limits = self._arm.gripper, self._arm.limits
+        self._state = self._session.begin(self._session.ready, gripper.opened, 0.0)
+        self._rates = np.repeat((LINEAR, ANGULAR), (3, self._arm.kinematics.freedoms - 3))
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(self._rates) + 1,), np.float32)
+        pose = np.array((MAX_PLACE,) * 3 + (1.0,) * 6)
+        forces = np.full(len(finger_forces(hand, self._state)), MAX_FORCE)
+        bounds = {
+            "joints": (limits.lower, limits.upper),
+            "fingers": (np.array([gripper.lower]), np.array([gripper.upper])),
+            "tool": (-pose, pose),
+            **dict.fromkeys(self._names, (-pose, pose)),
+            "forces": (np.zeros_like(forces), forces),
+            "goal": (-pose[:3], pose[:3]),
+            "water": (np.zeros(2), np.full(2, MAX_AMOUNT)),
+        }
+        ends = np.cumsum([len(lower) for lower, _ in bounds.values()]).tolist()
+        self.parts = dict(zip(bounds, map(slice, [0, *ends], ends), strict=False))
+        low, high = map(np.concatenate, zip(*bounds.values(), strict=True))
+        self._low, self._high = low.astype(np.float32), high.astype(np.float32)
+        self.observation_space = gymnasium.spaces.Box(self._low, self._high, dtype=np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Numbers, dict[str, Any]]:
+        """Return the observation and the info of a new episode, whose places ``seed`` decides.
+
+        Raises InputError for any of ``options``, because there are none.
+        """
+        super().reset(seed=seed)
+        if options:
+            raise InputError(f"`reset` has no options. Leave out {', '.join(map(str, options))}.")
+        self._state = self._session.begin(self._session.ready, self._arm.gripper.opened, 0.0)
+        table = Table(self._tool()[:3, 3], self._arm.T_base_shoulder[:3, 3], self.np_random)
+        scene = table.scene(self._task, self._state.objects)
+        self._goal, self._tick = scene.goal, 0
+        self._advance(cmd.ReplaceScene(scene.objects, scene.volume))
+        return self._observation(), self._info(False)
+
+    def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
+        """Jog the tool for 0.1 s.
+
+        Args:
+            action: (k + 1,) the k rates of the tool, then the opening of the fingers, all from -1
+                to 1; greater numbers are clipped.
+
+        Raises InputError for another shape and for numbers that are not finite.
+        """
+        values = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
+        if values.shape != self.action_space.shape or not np.isfinite(values).all():
+            raise InputError(f"An action is {len(self._rates) + 1} finite numbers, not {action!r}.")
+        closed, opened = self._arm.gripper.closed, self._arm.gripper.opened
+        fingers = closed + 0.5 * (values[-1] + 1.0) * (opened - closed)
+        self._advance(cmd.Jog(values[:-1] * self._rates), cmd.Gripper(float(fingers)))
+        for _ in range(1, STEP_TICKS):
+            self._advance()
+        place, held = self._pose(self._names[0])[:3, 3], self._state.held is not None
+        if self._task == "Pour":
+            error = max(1.0 - self._water()[1] / WANTED, 0.0)
+            success = error == 0.0
+        else:
+            error = float(np.linalg.norm(place - self._goal_place()))
+            success = error <= PLACE_ERROR and not held and not self._state.objects_move
+        away = 0.0 if held or success else float(np.linalg.norm(place - self._tool()[:3, 3]))
+        reward = float(success) - error - away
+        return self._observation(), reward, success, False, self._info(success)
+
+    def _advance(self, *commands: cmd.Command) -> None:
+        """Execute ``commands`` in a tick of an arm that follows exactly."""
+        self._tick += 1
+        state = self._session.step(self._state, commands, self._tick / Settings.rate)
+        self._state = Session.observe(state, state.setpoint, state.gripper_setpoint)
+
+    def _tool(self) -> FloatArray:
+        """Return the pose (4, 4) of the tool in the base frame."""
+        T = forward(self._arm.chain_to(self._state.tool), self._state.q)
+        return np.asarray(self._arm.T_base_shoulder @ T)
+
+    def _pose(self, name: str) -> FloatArray:
+        """Return the pose (4, 4) of an object in the base frame."""
+        scene_object = named(self._state.objects, name)
+        assert scene_object is not None
+        return self._session.environment.pose(scene_object, self._state.x)
+
+    def _goal_place(self) -> FloatArray:
+        """Return where the first object is to stand, (3,) in the base frame [m]."""
+        return self._goal + sum(self._pose(name)[:3, 3] for name in self._names[1:])
+
+    def _water(self) -> tuple[float, float]:
+        """Return the water in the cup and in the basin [ml]."""
+        if self._state.poured is None:
+            return 0.0, 0.0
+        water = self._state.poured.water
+        return water.cup.kept / MILLILITRE, water.basin / MILLILITRE
+
+    def _observation(self) -> Numbers:
+        poses = (self._tool(), *map(self._pose, self._names))
+        numbers = [self._state.x, *(np.append(T[:3, 3], T[:3, :2].T) for T in poses)]
+        forces = np.array([*finger_forces(self._hand, self._state).values()])
+        numbers += [forces, self._goal_place(), np.array(self._water())]
+        return np.clip(np.concatenate(numbers).astype(np.float32), self._low, self._high)
+
+    def _info(self, success: bool) -> dict[str, Any]:
+        """Return the success, and the reasons that limit the arm."""
+        reasons = (finding.reason.value for finding in self._state.findings)
+        return {"is_success": success, "limited_by": ", ".join(reasons)}
