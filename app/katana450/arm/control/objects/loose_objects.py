@@ -40,7 +40,7 @@ FRICTION = 0.35
 """[1] Coefficient of friction of objects on the table and on each other: smooth plastic. Assumed.
 """
 
-MASS_STEP = 1e-3
+MASS_STEP = 1e-2
 """[kg] The mass of the water in a vessel counts in steps, because each mass is another model."""
 
 FULL_FORCE_WAY = 5e-3
