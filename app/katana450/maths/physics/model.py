@@ -55,9 +55,6 @@ SLIDING, SPINNING, ROLLING = 3, 4, 6
 FINGER_INERTIA, FINGER_MASS = 3e-3, 0.3
 """[kg m^2, kg] Inertia of the drive at a finger that turns, and at one that slides. Assumed."""
 
-COUPLING = (0.99, 0.999, 1e-4, 0.5, 2.0)
-"""How hard the fingers are coupled to each other, as CONTACT_STIFFNESS."""
-
 PAD_FRICTION, PAD_SPIN = 0.8, 0.01
 """[1, m] Coefficient of friction of the fingers, rubber on smooth plastic, and their friction
 against turning, that of a soft pad of 20 by 30 mm. Assumed."""
@@ -201,7 +198,7 @@ class _Builder:
             offset = float(linkage.offset[group] - ratio * linkage.offset[first])
             coupling.data[:5] = offset, ratio, 0.0, 0.0, 0.0
             coupling.solref[:2] = CONTACT_TIME, 1.0
-            coupling.solimp[:5] = COUPLING
+            coupling.solimp[:5] = CONTACT_STIFFNESS
         # Seen at the first finger, whose joint moves by a factor of the finger joint.
         factor = abs(float(linkage.factor[first]))
         stiffness = drive.stiffness / factor**2
