@@ -23,10 +23,10 @@ from katana450.extensions.real_arm.codec.requests import (
     SendSplines,
 )
 from katana450.extensions.real_arm.driver.machine import ArmMachine
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, EncoderMap
+from katana450.extensions.real_arm.encoder_map import EncoderMap
 from katana450.maths.geometry.arrays import FloatArray
 
-MAP = EncoderMap(DEFAULT_VARIANT)
+MAP = EncoderMap()
 HOME = np.array([0, -15000, -14000, 14000, 7000, 20000])
 JOINTS = MAP.joints(HOME)
 ENDS = np.sort([MAP.joints(MAP.lower), MAP.joints(MAP.upper)], axis=0)
@@ -155,7 +155,7 @@ class Conversation:
     """
 
     def __init__(self) -> None:
-        self.machine = ArmMachine(DEFAULT_VARIANT, ENDS, JOINTS, self._travel)
+        self.machine = ArmMachine(ENDS, JOINTS, self._travel)
         self.arm = PaperArm()
         self.now = 100.0
         self.setpoint: Callable[[float], FloatArray] = lambda _: JOINTS

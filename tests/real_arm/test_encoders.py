@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from katana450.arm.control.arm import ArmModel
 from katana450.errors import ConfigurationError
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, EncoderMap
+from katana450.extensions.real_arm.encoder_map import EncoderMap
 
-MAP = EncoderMap(DEFAULT_VARIANT)
+MAP = EncoderMap()
 CALIBRATED = np.array([30500, -30500, -30500, 30500, 30500, 30500])
 
 Unit = st.floats(0.0, 1.0)

@@ -23,7 +23,6 @@ from katana450.extensions.real_arm.driver.spline_motion import (
 )
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware, RequestError
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
@@ -41,7 +40,7 @@ class EmulatorOnPaper:
         for axis, count in zip(self.arm.axes, MAP.encoders(joints), strict=True):
             axis.plant.position = axis.plant.output = float(count)
             axis.freeze()
-        self.machine = ArmMachine(DEFAULT_VARIANT, ENDS, joints)
+        self.machine = ArmMachine(ENDS, joints)
         self._firmware = Firmware(self.arm)
         self._delay, self._jitter = delay, jitter
         self._chance = np.random.default_rng(450)

@@ -16,7 +16,7 @@ from katana450.extensions.real_arm.codec.requests import (
 )
 from katana450.extensions.real_arm.driver.procedures import ArmReadings
 from katana450.extensions.real_arm.driver.spline_motion import SplineMotion
-from katana450.extensions.real_arm.variants import EncoderMap, Variant
+from katana450.extensions.real_arm.encoder_map import AXIS_FACTS, DRIVEN, EncoderMap
 from katana450.maths.geometry.arrays import FloatArray
 
 FINGER_STEP = 4
@@ -101,23 +101,23 @@ MOVING_SPEED = 200.0
 class ArmMotion:
     """Motions of the arm, one after another, and targets of the gripper."""
 
-    def __init__(self, variant: Variant, encoders: EncoderMap, arm: ArmReadings) -> None:
+    def __init__(self, encoders: EncoderMap, arm: ArmReadings) -> None:
         """Create it for the arm that ``arm`` measures."""
-        self._variant, self._encoders, self._arm = variant, encoders, arm
+        self._encoders, self._arm = encoders, arm
         self._motions: deque[SplineMotion] = deque()
-        self._finger = FingerOrders(FINGER + 1, variant.axes[FINGER].speed)
+        self._finger = FingerOrders(FINGER + 1, AXIS_FACTS[FINGER].speed)
         self._finger_freed = self._ended_at = -np.inf
         self._ignored: FloatArray | None = None
 
     @property
     def axes(self) -> tuple[int, ...]:
         """Axes of the arm without its gripper, from 1."""
-        return self._variant.driven[:FINGER]
+        return DRIVEN[:FINGER]
 
     def clear(self) -> None:
         """Drop all motions and targets, so that only a later setpoint moves anything."""
         self._motions.clear()
-        self._finger = FingerOrders(FINGER + 1, self._variant.axes[FINGER].speed)
+        self._finger = FingerOrders(FINGER + 1, AXIS_FACTS[FINGER].speed)
 
     def moves(self, now: float) -> bool:
         """Return whether anything moves at ``now`` [s], or is about to."""
@@ -165,8 +165,6 @@ class ArmMotion:
 
     def finger_order(self) -> CommandMotor | None:
         """Return the order to the gripper that waits, or None."""
-        if not self._variant.has_gripper:
-            return None
         if FINGER + 1 in self._arm.collided and self._arm.states_t > self._finger_freed:
             # The fingers stop at an object because they hold it. The arm has not collided.
             position = int(self._arm.positions[FINGER])

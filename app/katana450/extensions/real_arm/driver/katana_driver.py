@@ -20,6 +20,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.real_arm.codec.requests import ArmRequest
 from katana450.extensions.real_arm.driver.machine import ArmMachine
+from katana450.extensions.real_arm.encoder_map import EncoderMap
 from katana450.extensions.real_arm.link import (
     ArmLink,
     ArmRefusalError,
@@ -28,7 +29,6 @@ from katana450.extensions.real_arm.link import (
     LinkLostError,
 )
 from katana450.extensions.real_arm.tool_travel import Travel, tool_travel
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, EncoderMap, Variant
 from katana450.extras import require
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -73,7 +73,6 @@ class KatanaDriver:
         url: ArmUrl,
         bounds: FloatArray,
         joints: FloatArray,
-        variant: Variant = DEFAULT_VARIANT,
         clock: Callable[[], float] = time.perf_counter,
         travel: Travel | None = None,
         exchange_log: ExchangeLog | None = None,
@@ -84,17 +83,16 @@ class KatanaDriver:
             url: Address of the arm.
             bounds: (2, 6) lower and upper limits of the joints and the finger joint [rad].
             joints: (6,) values of them that are reported before the first measurement [rad].
-            variant: The arm.
             clock: Clock of the control loop.
             travel: Travel of the tool between two postures; None if a stop is measured without it.
             exchange_log: File of all exchanges; None for none.
 
         Raises ConfigurationError if the limits of the joints are not those of the arm.
         """
-        EncoderMap(variant).check_limits(*bounds[:, :JOINTS])
+        EncoderMap().check_limits(*bounds[:, :JOINTS])
         self._url, self._exchange_log = url, exchange_log
         self._clock = clock
-        self._machine = ArmMachine(variant, bounds, joints, travel)
+        self._machine = ArmMachine(bounds, joints, travel)
         self._link: ArmLink | None = None
         self._heard_at = clock()
         self._retry, self._retry_at = SHORTEST_RETRY, -np.inf

@@ -38,9 +38,9 @@ from katana450.extensions.real_arm.driver.procedures import (
     identify,
     release,
 )
+from katana450.extensions.real_arm.encoder_map import DRIVEN, EncoderMap
 from katana450.extensions.real_arm.link import ArmRefusalError
 from katana450.extensions.real_arm.tool_travel import Travel
-from katana450.extensions.real_arm.variants import EncoderMap, Variant
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 POLLS = ((ReadPositions(), 0.04), (ReadStates(), 0.1), (ReadSensors(), 0.25))
@@ -80,7 +80,6 @@ class ArmMachine:
 
     def __init__(
         self,
-        variant: Variant,
         bounds: FloatArray,
         joints: FloatArray,
         travel: Travel | None = None,
@@ -88,17 +87,16 @@ class ArmMachine:
         """Create it without a connection.
 
         Args:
-            variant: The arm.
             bounds: (2, 6) lower and upper limits of the joints and the finger joint [rad].
             joints: (6,) values of them that are reported before the first measurement [rad].
             travel: Travel of the tool between two postures; None if a stop is measured without it.
         """
         self.mode, self.note = ArmMode.DISCONNECTED, FIRST_NOTE
         self.arm = ArmReadings()
-        self._variant, self._encoders = variant, EncoderMap(variant)
+        self._encoders = EncoderMap()
         self._bounds, self._travel = bounds, travel
         self._joints = frozen(joints)
-        self._motion = ArmMotion(variant, self._encoders, self.arm)
+        self._motion = ArmMotion(self._encoders, self.arm)
         self._acts: deque[ArmAct] = deque()
         self._procedure: Procedure | None = None
         self._step: ArmRequest | None = None
@@ -107,7 +105,7 @@ class ArmMachine:
         self._stop_asked: float | None = None
         self._polled: dict[type[ArmRequest], float] = {}
         self._refusals = 0
-        self._has_sensors = variant.has_gripper
+        self._has_sensors = True
         self._round_trip = 0.0
         self._measured_stop: MeasuredStop | None = None
         self._wants_link = self._was_connected = self._must_freeze = False
@@ -134,9 +132,9 @@ class ArmMachine:
         """Begin to identify the arm at ``address`` on a new connection."""
         again = " again" if self._was_connected else ""
         self._clear()
-        self._has_sensors = self._variant.has_gripper
+        self._has_sensors = True
         sentence = f"Connected{again} to {address}."
-        self._procedure = identify(self.arm, self._variant, sentence)
+        self._procedure = identify(self.arm, sentence)
         self._resume_at = -np.inf
 
     def lost(self, problem: str) -> None:
@@ -191,7 +189,7 @@ class ArmMachine:
         self._acts.clear()
         if self.mode is ArmMode.CALIBRATING and self._procedure is not None:
             self._procedure.close()
-            axes = self._variant.driven
+            axes = DRIVEN
             self._start(halt(self.arm, axes, self._encoders, now, CALIBRATION_ENDED), now)
         elif self._wants_link and not self.mode.follows:
             self._must_freeze = True
@@ -320,7 +318,7 @@ class ArmMachine:
         if self._must_freeze:
             self._must_freeze = False
             if self.arm.axes_in(*IN_MOTION, AxisStatus.CALIBRATING):
-                axes = self._variant.driven
+                axes = DRIVEN
                 self._start(halt(self.arm, axes, self._encoders, now, MOVED_BY_ITSELF), now)
                 return
         if self._stop_asked is not None:
@@ -336,11 +334,11 @@ class ArmMachine:
             match act:
                 case ArmAct.CALIBRATE:
                     self.mode, self.note = ArmMode.CALIBRATING, "The arm moves to its stops."
-                    self._start(calibrate(self.arm, self._variant), now)
+                    self._start(calibrate(self.arm), now)
                 case ArmAct.RELEASE:
-                    self._start(release(self.arm, self._variant), now)
+                    self._start(release(self.arm), now)
                 case _:
-                    self._start(hold(self.arm, self._variant), now)
+                    self._start(hold(self.arm), now)
 
     def _start(self, procedure: Procedure, now: float) -> None:
         self._procedure, self._step, self._resume_at = procedure, None, now
@@ -350,7 +348,7 @@ class ArmMachine:
         self.mode = ArmMode.MOVING
         if cause:
             self.note = cause
-        axes = self._variant.driven
+        axes = DRIVEN
         if not self._motion.finger_moves(press):
             # Fingers at rest keep their order, and so what they hold.
             axes = self._motion.axes

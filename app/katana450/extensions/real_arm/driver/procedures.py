@@ -42,9 +42,9 @@ from katana450.extensions.real_arm.codec.requests import (
     SetAxisParameter,
     SetCollisionDetection,
 )
+from katana450.extensions.real_arm.encoder_map import DRIVEN, MAX_SPEED, EncoderMap
 from katana450.extensions.real_arm.link import ArmRefusalError
 from katana450.extensions.real_arm.tool_travel import Travel
-from katana450.extensions.real_arm.variants import MAX_SPEED, EncoderMap, Variant
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 SHORTEST_INTERVAL = 0.02
@@ -178,14 +178,14 @@ Procedure = Generator[ArmRequest | float, None, ProcedureEnd]
 _Part = Generator[ArmRequest | float, None, None]
 
 
-def identify(arm: ArmReadings, variant: Variant, sentence: str) -> Procedure:
+def identify(arm: ArmReadings, sentence: str) -> Procedure:
     """Read what the arm is and where it is. An arm that moves is stopped.
 
     sentence: Sentence with which the note begins.
     """
     yield ReadMasterVersion()
     yield ReadArmIdentity()
-    for axis in variant.driven:
+    for axis in DRIVEN:
         yield ReadSlaveVersion(axis)
     yield ReadPositions()
     yield ReadStates()
@@ -206,15 +206,15 @@ def identify(arm: ArmReadings, variant: Variant, sentence: str) -> Procedure:
     )
 
 
-def hold(arm: ArmReadings, variant: Variant) -> Procedure:
+def hold(arm: ArmReadings) -> Procedure:
     """Let the motors hold the arm where it is, also after a collision or an error."""
     yield from _flush()
     yield ReadPositions()
-    yield from _freeze(arm, variant.driven)
-    return (yield from _ready(arm, variant))
+    yield from _freeze(arm, DRIVEN)
+    return (yield from _ready(arm))
 
 
-def calibrate(arm: ArmReadings, variant: Variant) -> Procedure:
+def calibrate(arm: ArmReadings) -> Procedure:
     """Let the arm move to its stops and find its encoders, without detection of collisions."""
     yield SetCollisionDetection(0)
     try:
@@ -223,30 +223,30 @@ def calibrate(arm: ArmReadings, variant: Variant) -> Procedure:
     except ArmRefusalError:
         yield SetCollisionDetection(1)
         raise
-    return (yield from _calibrated(arm, variant))
+    return (yield from _calibrated(arm))
 
 
-def _calibrated(arm: ArmReadings, variant: Variant) -> Procedure:
+def _calibrated(arm: ArmReadings) -> Procedure:
     """Wait for the end of a calibration. Only single axes are asked for, as is known to work."""
     start = arm.newest_reply
     while arm.newest_reply - start < CALIBRATION_TIMEOUT:
         yield CALIBRATION_PAUSE
-        for axis in reversed(variant.driven):
+        for axis in reversed(DRIVEN):
             # The first axis is known to answer meanwhile, and ends last.
             with suppress(*(ArmRefusalError,) * (axis != 1)):
                 yield ReadAxis(axis)
         if not arm.axes_in(AxisStatus.CALIBRATING):
             yield ReadPositions()
             arm.held = arm.positions
-            return (yield from _ready(arm, variant))
+            return (yield from _ready(arm))
     return ProcedureEnd(ArmMode.FAULT, "The calibration did not end. Switch the arm off.")
 
 
-def release(arm: ArmReadings, variant: Variant) -> Procedure:
+def release(arm: ArmReadings) -> Procedure:
     """Switch all motors off."""
     yield from _flush()
     yield ReadPositions()
-    for axis in variant.driven:
+    for axis in DRIVEN:
         yield CommandMotor(axis, MotorFlag.OFF, int(arm.positions[axis - 1]))
     yield ReadStates()
     return ProcedureEnd(ArmMode.UNCALIBRATED, "Motors off: the arm is not held.")
@@ -338,17 +338,15 @@ def _freeze(arm: ArmReadings, axes: Iterable[int]) -> _Part:
         arm.held = held
 
 
-def _ready(arm: ArmReadings, variant: Variant) -> Procedure:
+def _ready(arm: ArmReadings) -> Procedure:
     """Switch collision detection on, and check that all axes hold."""
     yield SetCollisionDetection(1)
-    if variant.has_gripper:
-        finger = len(variant.axes)
-        with suppress(ArmRefusalError):
-            yield SetAxisParameter(finger, SPEED_LIMIT, MAX_SPEED, MAX_SPEED)
-            yield SetAxisParameter(finger, ACCELERATION_LIMIT, FINGER_ACCELERATION, 0)
+    with suppress(ArmRefusalError):
+        yield SetAxisParameter(AXES, SPEED_LIMIT, MAX_SPEED, MAX_SPEED)
+        yield SetAxisParameter(AXES, ACCELERATION_LIMIT, FINGER_ACCELERATION, 0)
     for _ in range(READY_TRIES):
         yield ReadStates()
-        wrong = [axis for axis in variant.driven if axis not in arm.axes_in(*AT_REST)]
+        wrong = [axis for axis in DRIVEN if axis not in arm.axes_in(*AT_REST)]
         if not wrong:
             return ProcedureEnd(ArmMode.HOLDING)
         yield READY_PAUSE

@@ -18,9 +18,9 @@ from katana450.extensions.real_arm.emulator.axis import (
     EmulatedAxis,
     TargetMove,
 )
+from katana450.extensions.real_arm.encoder_map import EncoderMap
 from katana450.extensions.real_arm.plant.axis import KATANA450, STEP, PlantProfile
 from katana450.extensions.real_arm.plant.driver import GravityLoads
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, EncoderMap
 from katana450.maths.geometry.arrays import FloatArray
 
 SEARCH_SPEED, SLOW_SPEED = 6000.0, 1000.0
@@ -144,7 +144,7 @@ def sensor_values(squeeze: float) -> tuple[int, ...]:
     return tuple(force if place in FORCE_SENSORS else 0 for place in range(SENSORS))
 
 
-ENCODERS = EncoderMap(DEFAULT_VARIANT)
+ENCODERS = EncoderMap()
 
 
 def joints_at(counts: Sequence[float]) -> tuple[FloatArray, float]:

@@ -9,8 +9,8 @@ from enum import Enum
 
 from katana450.extensions.real_arm.codec.replies import AxisStatus
 from katana450.extensions.real_arm.codec.requests import AxisSegment, More
+from katana450.extensions.real_arm.encoder_map import AXIS_FACTS, MAX_SPEED, AxisFacts
 from katana450.extensions.real_arm.plant.axis import STEP, PlantAxis, PlantProfile
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, MAX_SPEED, AxisFacts
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ CONFIGURED = ((30, 250), (25, 200), (20, 250), (25, 200), (25, 100), (25, 100))
 """Speed and collision limits of the axes, from the configuration of this arm."""
 
 MOTORS = tuple(
-    MotorFacts(axis, *limits) for axis, limits in zip(DEFAULT_VARIANT.axes, CONFIGURED, strict=True)
+    MotorFacts(axis, *limits) for axis, limits in zip(AXIS_FACTS, CONFIGURED, strict=True)
 )
 
 CALIBRATION_ORDER = (2, 3, 4, 5, 6, 1)

@@ -1,16 +1,14 @@
-"""Configuration of the axes of each variant of the arm whose numbers are known.
+"""The axes of the arm: their encoders, their joints, and the map between both.
 
-The numbers are those of the manufacturer's configuration of a Katana450 6M180. For the angled
-variants (6M90), the Katana300 and the Katana400, whose axes have other ranges, no numbers are at
-hand: add them here when they have been read from the configuration of such an arm.
+The numbers are those of the manufacturer's configuration of a Katana450 6M180 with its gripper. For
+the angled arms (6M90), the Katana300 and the Katana400, whose axes have other ranges, no numbers
+are at hand.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -70,27 +68,7 @@ class AxisFacts:
         return self.joint_ratio * math.radians(self.angle_offset) + self.joint_shift
 
 
-@dataclass(frozen=True)
-class Variant:
-    """An arm as it was configured.
-
-    Attributes:
-        name: Name of its configuration.
-        axes: (6,) Its axes; the last one is the gripper's motor.
-        has_gripper: Whether a gripper is mounted. Without it the sixth axis is never commanded.
-    """
-
-    name: str
-    axes: tuple[AxisFacts, ...]
-    has_gripper: bool = True
-
-    @property
-    def driven(self) -> tuple[int, ...]:
-        """Numbers of the axes that are commanded, from 1."""
-        return tuple(range(1, len(self.axes) + self.has_gripper))
-
-
-_AXES = (
+AXIS_FACTS = (
     AxisFacts(51200, 31000, 6.65, 1, -17213, 31000, MAX_SPEED, 1.0, -math.pi),
     AxisFacts(94976, -31000, 124.25, 1, -31000, 3824, MAX_SPEED, -1.0, 0.0),
     # The protocol counts the encoder of this axis halved, so its maximum speed is halved too.
@@ -109,17 +87,10 @@ _AXES = (
         FINGER_CLOSED - FINGER_RATIO * MOTOR_CLOSED,
     ),
 )
+"""The axes, of which the last one is the gripper's motor."""
 
-VARIANTS: Mapping[str, Variant] = MappingProxyType(
-    {
-        arm.name: arm
-        for arm in (Variant("6M180_G", _AXES), Variant("6M180_F", _AXES, has_gripper=False))
-    }
-)
-"""Known variants by name: the straight arm with its angle gripper, and with a bare flange."""
-
-DEFAULT_VARIANT = VARIANTS["6M180_G"]
-
+DRIVEN = tuple(range(1, len(AXIS_FACTS) + 1))
+"""Numbers of the axes that are commanded, from 1."""
 
 LIMIT_TOLERANCE = np.radians(0.5)
 """[rad] Maximum difference between the limits of an arm and those of its description."""
@@ -134,15 +105,14 @@ class EncoderMap:
         speed: (6,) maximum speeds [encoders per tick of 10 ms].
     """
 
-    def __init__(self, variant: Variant) -> None:
-        axes = variant.axes
+    def __init__(self) -> None:
+        axes = AXIS_FACTS
         self.scale = frozen([axis.joint_per_encoder for axis in axes])
         self.lower = frozen([axis.encoder_min for axis in axes])
         self.upper = frozen([axis.encoder_max for axis in axes])
         self.speed = frozen([axis.speed for axis in axes])
         self._joint_at_offset = frozen([axis.joint_at_offset for axis in axes])
         self._offset = frozen([axis.encoder_offset for axis in axes])
-        self._name = variant.name
 
     def joints(self, encoders: FloatArray | IntArray) -> FloatArray:
         """Return the joints (6,) [rad] at ``encoders`` (6,)."""
@@ -157,6 +127,6 @@ class EncoderMap:
         ends = np.sort([self.joints(self.lower)[:5], self.joints(self.upper)[:5]], axis=0)
         if lower.shape != (5,) or np.abs(ends - [lower, upper]).max() > LIMIT_TOLERANCE:
             raise ConfigurationError(
-                f"The robot description is not that of a Katana450 {self._name}: its joint limits "
-                f"differ. Use the description of this arm, or no --arm."
+                "The robot description is not that of a Katana450 6M180: its joint limits differ. "
+                "Use the description of this arm, or no --arm."
             )
