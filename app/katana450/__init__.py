@@ -18,6 +18,9 @@ poses. Each name below is loaded on first use, so that ``import katana450`` is f
 
 from typing import TYPE_CHECKING, Any
 
+from katana450.lazy_names import loaded as _loaded
+from katana450.lazy_names import modules_of as _modules_of
+
 if TYPE_CHECKING:
     from katana450.client import Client as Client
     from katana450.client import connect as connect
@@ -42,46 +45,16 @@ if TYPE_CHECKING:
     from katana450.maths.kinematics.pose import SE3 as SE3
     from katana450.maths.kinematics.solution import Solution as Solution
 
-_MODULES = {
-    "Arm": "library.arm",
-    "BlockedError": "errors",
-    "Branch": "maths.kinematics.branch",
-    "Client": "client",
-    "ConfigurationError": "errors",
-    "IKSolutions": "library.solutions",
-    "InputError": "errors",
-    "KatanaError": "errors",
-    "MotionPlan": "library.motion_plan",
-    "NearestPose": "extensions.general_arms.nearest",
-    "ReachabilityMap": "extensions.reachability.reachability",
-    "Recording": "library.recording",
-    "RobotDescriptionError": "errors",
-    "SE3": "maths.kinematics.pose",
-    "ScriptWriter": "library.script_writer",
-    "Solution": "maths.kinematics.solution",
-    "Trajectory": "library.trajectory",
-    "Viewer": "library.viewer",
-    "connect": "client",
-    "load": "library.loading",
-    "open": "library.recording",
-    "program": "library.script_writer",
-}
+_MODULES = _modules_of(__file__)
 
-__all__ = list(_MODULES)
-
+__all__ = sorted(_MODULES)  # noqa: PLE0605
 
 # Hidden from type checkers, which would otherwise accept every name.
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
-        """Load a public name when it is first used (PEP 562)."""
-        if name not in _MODULES:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        from importlib import import_module
-
-        value = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
-        globals()[name] = value
-        return value
+        """Load a public name when it is first used."""
+        return _loaded(name, _MODULES, globals())
 
 
 def __dir__() -> list[str]:

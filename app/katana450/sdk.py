@@ -8,10 +8,9 @@ stay as they are within a minor version. ``docs/extensions.md`` describes how th
 
 from __future__ import annotations
 
-import ast
-from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from katana450.lazy_names import loaded, modules_of
 
 if TYPE_CHECKING:
     from katana450.arm.control.actor import Actor as Actor
@@ -64,12 +63,7 @@ if TYPE_CHECKING:
     from katana450.server.web.http_api import RouteContext as RouteContext
     from katana450.server.web.listen import listen as listen
 
-MODULES = {
-    name.name: node.module
-    for node in ast.walk(ast.parse(Path(__file__).read_text(encoding="utf-8")))
-    if isinstance(node, ast.ImportFrom) and str(node.module).startswith("katana450.")
-    for name in node.names
-}
+MODULES = modules_of(__file__)
 """The module of each public name, as the imports for type checkers above say."""
 
 __all__ = sorted(MODULES)  # noqa: PLE0605
@@ -78,15 +72,8 @@ __all__ = sorted(MODULES)  # noqa: PLE0605
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
-        """Load a public name when it is first used (PEP 562)."""
-        if name not in MODULES:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        parent = MODULES[name]
-        module = import_module(parent)
-        # The name can be that of a module, which its package need not have loaded.
-        value = getattr(module, name, None) or import_module(f"{parent}.{name}")
-        globals()[name] = value
-        return value
+        """Load a public name when it is first used."""
+        return loaded(name, MODULES, globals())
 
 
 def __dir__() -> list[str]:
