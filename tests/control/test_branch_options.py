@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -11,7 +12,8 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.tool_targets import branch_options
-from katana450.arm.control.state.messages import PRIORITIES
+from katana450.arm.control.state.findings import of_projection
+from katana450.arm.control.state.messages import PRIORITIES, finding_text
 from katana450.arm.control.state.modes import JointTarget
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.maths.geometry import se3, so3
@@ -19,6 +21,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 
 TICK = 0.01
@@ -75,18 +78,6 @@ def test_branch_change_crosses_a_gap(arm: ArmModel, session: Session, state: Sta
     on = take(session, across, cmd.Position(desired + 0.001 * ACROSS))
     assert np.abs(on.goal - across.goal).max() < 0.1
     assert on.status is not Status.GAP
-
-
-def test_typed_poses_and_joints_are_reached_at_joint_speed(
-    arm: ArmModel, session: Session, state: State
-) -> None:
-    held = at_the_edge(session, state)
-    R = so3.rotation_y(SPLIT_PITCH)
-    T = se3.from_rotation_translation(R, SPLIT + 0.0195 * ACROSS)
-    typed = take(session, held, cmd.Pose(T))
-    assert np.allclose(point(arm, typed.goal), T[:3, 3], atol=1e-9)
-    assert np.abs(typed.goal - held.goal).max() > 1.0
-    assert (np.abs(typed.setpoint - held.setpoint) <= arm.chain.speed * TICK * (1 + 1e-9)).all()
 
 
 @pytest.mark.parametrize("branch", BRANCHES, ids=str)
@@ -206,6 +197,19 @@ def test_each_priority_loses_its_own_part_in_a_drag_out_of_reach(
         assert tilted > 0.1
         assert short < 1e-9
         assert Reason.PITCH_CHANGED in reasons(state)
+
+
+def test_lost_pitch_is_reported_also_out_of_reach(session: Session) -> None:
+    narrow = np.full(5, math.radians(20.0))
+    chain = dataclasses.replace(session.require_arm().chain, lower=-narrow, upper=narrow)
+    T = se3.from_rotation_translation(so3.rotation_y(math.pi / 2.0), np.array((1.0, 0.0, 0.0)))
+    p = project(chain, T, priority=Priority.PITCH)
+    assert p.pitch_error > 0.1
+    findings = of_projection(chain, p, Priority.PITCH, yaw_was_given=True)
+    amounts = {finding.reason: finding.amount for finding in findings}
+    assert amounts[Reason.OUT_OF_REACH] == p.position_error
+    assert amounts[Reason.PITCH_CHANGED] == p.pitch_error
+    assert all(finding_text(finding) for finding in findings)
 
 
 def test_new_priority_reapplies_the_target_or_changes_nothing(

@@ -45,6 +45,15 @@ NAN = math.nan
         (lambda: cmd.Branch("front"), "or a name"),
         (cmd.Branch, "or a name"),
         (lambda: cmd.Orient(np.ones((3, 3))), "rotation"),
+        (lambda: cmd.Jog([0.1] * 4), "jog"),  # type: ignore[arg-type]
+        (lambda: cmd.Jog([NAN] * 5), "jog"),  # type: ignore[arg-type]
+        (lambda: cmd.Jog("fast"), "jog"),  # type: ignore[arg-type]
+        (lambda: cmd.Jog([[0.1] * 5]), "jog"),  # type: ignore[arg-type]
+        (lambda: cmd.Jog(np.zeros(5), "world"), "JogFrame"),  # type: ignore[arg-type]
+        *(
+            (lambda fraction=fraction: cmd.Speed(fraction), "speed")
+            for fraction in (0.0, -0.1, 1.1, NAN, math.inf, True, "1")
+        ),
     ],
 )
 def test_invalid_command_is_refused_with_the_reason(

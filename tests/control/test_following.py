@@ -205,32 +205,6 @@ def test_plan_for_another_arm_is_refused(arm: ArmModel, session: Session, poured
         other.check(cmd.Follow(poured))
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        cmd.Joint(1, 0.3),
-        cmd.Home(),
-        cmd.Position(np.array([0.3, 0.1, 0.0])),
-        cmd.Jog(np.array([0.05, 0.0, 0.0, 0.0, 0.0])),
-        cmd.Hold(),
-    ],
-)
-def test_other_motion_ends_the_plan_inside_the_limits(
-    session: Session, poured: Plan, command: cmd.Command
-) -> None:
-    start = session.begin(poured.start, 0.0, 0.0)
-    under_way = trace(session, start, {0: [cmd.Follow(poured)]}, 120)
-    assert not under_way[-1].motion.at_rest
-    after = until_rest(session, under_way[-1], command)
-    assert after[-1].following is None
-    assert not after[-1].moving
-    limits, slack = session.require_arm().limits, 1.0 + 1e-6
-    for a, b in pairwise([under_way[-1], *after]):
-        assert (np.abs(b.motion.qd) <= limits.speed * slack).all()
-        change = np.abs(b.motion.qd - a.motion.qd)
-        assert (change <= limits.acceleration * TICK * slack + 1e-8).all()
-
-
 def test_tool_and_gripper_commands_do_not_end_the_plan(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
     commands: list[cmd.Command] = [cmd.Gripper(0.2), cmd.Tool("grasp"), cmd.EndDrag()]

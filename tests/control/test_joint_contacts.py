@@ -124,19 +124,6 @@ def test_stop_and_pause_work_before_a_contact(make: Make) -> None:
     assert (paused.status, paused.moving) == (Status.PAUSED, False)
 
 
-def test_thumb_and_finger_meet_and_the_following_joint_counts(make: Make) -> None:
-    machine = make(hand())
-    session, world = machine.session, machine.world
-    command = machine.move(thumb_bend1=0.0, finger2_bend1=1.5, finger2_bend2=1.2)
-    states = during(session, begun(session), 4.0, command)
-    assert min(excess(world, state) for state in states) >= -DISTANCE_ROUNDING
-    state = states[-1]
-    assert state.blocked
-    assert state.findings[0].parts is not None
-    assert "thumb" in "".join(state.findings[0].parts)
-    assert "finger2" in "".join(state.findings[0].parts)
-
-
 def test_joints_that_brake_on_a_curve_keep_the_clearance_between_its_samples(make: Make) -> None:
     # Two fingers that spread and bend pass each other while each joint brakes by itself.
     machine = make(hand())
@@ -189,13 +176,6 @@ def test_fingers_that_stand_closer_than_5_mm_keep_half_of_their_distance(make: M
     # Each finger alone bends past its neighbours.
     bent = during(session, begun(session), 3.0, machine.move(finger2_bend1=1.4))[-1]
     assert bent.setpoint[machine.joints.names.index("finger2_bend1")] == 1.4
-
-
-def test_without_a_world_joints_pass_each_other(make: Make) -> None:
-    machine = make(rail())
-    unchecked = Session(machine.joints, machine.joints.ready)
-    state = during(unchecked, begun(unchecked), 3.0, machine.move(slide_left=0.4))[-1]
-    assert state.setpoint[0] == 0.4
 
 
 def test_a_robot_that_begins_in_a_contact_can_leave_it(make: Make) -> None:

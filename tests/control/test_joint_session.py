@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.joints import JointSet
@@ -45,35 +42,6 @@ def test_session_begins_at_the_posture_nearest_to_zero(state: State) -> None:
     assert (state.status, state.moving, state.tool) == (Status.OK, False, "")
 
 
-joint_vectors = st.tuples(st.floats(-0.5, 0.9), st.floats(-4.0, 4.0), st.floats(-1.0, 1.0))
-
-
-@settings(max_examples=12)
-@given(
-    st.lists(st.tuples(joint_vectors, st.floats(0.02, 0.6)), min_size=1, max_size=4),
-    st.sampled_from([1.0, 0.3]),
-)
-def test_targets_keep_all_limits_and_the_last_is_reached(
-    targets: list[tuple[tuple[float, float, float], float]], fraction: float
-) -> None:
-    rules = Session(JOINTS, JOINTS.ready)
-    state = during(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.Speed(fraction))[-1]
-    limits, states = JOINTS.limits, [state]
-    for target, seconds in targets:
-        states += during(rules, state, seconds, cmd.Joints(np.array(target)))
-        state = states[-1]
-    state = rested(rules, state)
-    goal = np.clip(targets[-1][0], limits.lower, limits.upper)
-    np.testing.assert_array_equal(state.q, goal)
-    for before, now in pairwise(states):
-        motion = now.motion
-        assert ((motion.q >= limits.lower) & (motion.q <= limits.upper)).all()
-        assert (np.abs(motion.qd) <= fraction * limits.speed * (1.0 + 1e-6)).all()
-        assert (np.abs(motion.qdd) <= limits.acceleration * (1.0 + 1e-6)).all()
-        jump = np.abs(motion.qdd - before.motion.qdd) / DT
-        assert (jump <= limits.jerk * (1.0 + 1e-3) + 1e-6).all()
-
-
 def test_clamped_value_is_reported_in_its_unit(session: Session, state: State) -> None:
     end = during(session, state, DT, cmd.SetAxes(((1, 9.0), (2, 9.0), (3, 0.1))))[-1]
     findings = [(f.reason, f.axis, f.amount) for f in end.findings]
@@ -102,33 +70,6 @@ def test_stop_takes_the_reported_distance_and_holds_until_cleared(
     assert (free.stopped, free.findings, free.moving) == (None, (), False)
     home = rested(session, free, cmd.Home())
     np.testing.assert_array_equal(home.q, JOINTS.ready)
-
-
-def test_pause_keeps_the_goal_and_hold_drops_it(session: Session, state: State) -> None:
-    goal = np.array((0.3, 2.0, 0.1))
-    moving = during(session, state, 0.8, cmd.Joints(goal))[-1]
-    paused = during(session, moving, 3.0, cmd.Pause())[-1]
-    assert paused.status is Status.PAUSED
-    assert not paused.moving
-    fraction = (paused.q - state.q) / (goal - state.q)
-    np.testing.assert_allclose(fraction, fraction[0], rtol=0, atol=1e-9)
-    np.testing.assert_array_equal(rested(session, paused, cmd.Resume()).q, goal)
-    held = during(session, moving, 3.0, cmd.Hold())[-1]
-    assert not held.moving
-    assert not np.allclose(held.q, goal)
-
-
-def test_stream_is_followed_and_ends_at_rest(session: Session, state: State) -> None:
-    q = np.array(JOINTS.ready)
-    for _ in range(200):
-        q = q + np.array((0.1, 0.5, 0.0)) * DT
-        state = during(session, state, DT, cmd.Servo(q))[-1]
-    # The setpoint is one tick ahead of the newest sample, where the stream will be then.
-    np.testing.assert_allclose(state.q, q, rtol=0, atol=0.5 * DT * 2.1)
-    over = during(session, state, 2.0)[-1]
-    assert over.servo is None
-    assert not over.moving
-    assert 0.0 < float(over.q[1] - state.q[1]) < 0.5
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.commands import JOG_TIME
 from katana450.arm.control.session.session import Session
@@ -197,25 +196,6 @@ def test_feasible_stream_is_followed_closely(session: Session, every: int) -> No
     assert max(off[100:]) < max(0.012, 0.33 * every * DT)
 
 
-def test_streamed_targets_keep_the_limits(session: Session, arm: ArmModel) -> None:
-    rng = np.random.default_rng(7)
-    limits = arm.limits
-
-    def wild(_t: float) -> FloatArray:
-        return rng.uniform(arm.chain.lower - 0.5, arm.chain.upper + 0.5)
-
-    _, states = streamed(session, wild, 5.0, 3)
-    q = np.array([state.setpoint for state in states])
-    qd = np.array([state.motion.qd for state in states])
-    qdd = np.array([state.motion.qdd for state in states])
-    assert (q >= limits.lower).all()
-    assert (q <= limits.upper).all()
-    assert (np.abs(qd) <= limits.speed + 1e-9).all()
-    assert (np.abs(qdd) <= limits.acceleration + 1e-9).all()
-    assert (np.abs(np.diff(qdd, axis=0)) / DT <= limits.jerk + 1e-6).all()
-    assert (np.abs(np.diff(q, axis=0)) / DT <= limits.speed + 1e-9).all()
-
-
 def test_ended_stream_rests_at_its_last_sample(session: Session) -> None:
     stream = wave(session)
     _, states = streamed(session, stream, 1.0)
@@ -257,13 +237,6 @@ def test_arm_that_has_not_followed_rests_where_the_stream_ends(session: Session)
         rate = max(rate, float(np.abs(state.motion.qd).max()))
     assert state.motion.at_rest
     assert state.setpoint[0] - session.ready[0] < 2.0 * JOG_TIME * rate + 0.2
-
-
-def test_other_command_ends_the_stream(session: Session) -> None:
-    _, states = streamed(session, wave(session), 1.0)
-    for command in (cmd.Home(), cmd.Hold(), cmd.Stop(), cmd.Joint(1, 0.1)):
-        state = session.step(states[-1], [command], states[-1].t + DT)
-        assert state.servo is None
 
 
 def test_sample_drives_the_fingers_too(session: Session, state: State) -> None:

@@ -236,16 +236,6 @@ def test_ready_posture_outside_the_limits_is_refused(arm: ArmModel) -> None:
         Session(arm, np.full(5, 2.0))
 
 
-@pytest.mark.parametrize("point", [(0.0, 0.0, 0.3), (1e-12, 0.0, 0.3), (0.0, 0.0, 0.7)])
-def test_arm_keeps_its_azimuth_over_the_base(
-    session: Session, state: State, point: tuple[float, float, float]
-) -> None:
-    turned = ticked(session, state, cmd.Joint(1, 0.7))
-    over = ticked(session, turned, cmd.Position(np.array(point)), ticks=10)
-    assert over.goal[0] == pytest.approx(0.7, abs=1e-9)
-    assert np.isfinite(over.goal).all()
-
-
 def test_limit_of_a_drag_is_no_outcome_of_the_gripper_or_the_speed(
     session: Session, state: State
 ) -> None:

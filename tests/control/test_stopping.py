@@ -136,6 +136,22 @@ def test_pause_by_the_server_keeps_the_path_until_resume(session: Session, state
         assert both.pause_cause is None
 
 
+def test_resume_moves_nothing_where_a_pause_ended_the_brake_of_a_hold(
+    session: Session, state: State
+) -> None:
+    random = np.random.default_rng(450)
+    for _ in range(20):
+        away = cmd.Joints(session.ready + random.uniform(-0.5, 0.5, 5))
+        braking = ticked(session, ticked(session, state, away), ticks=int(random.integers(5, 40)))
+        braking = ticked(
+            session, ticked(session, braking, cmd.Hold()), ticks=int(random.integers(1, 8))
+        )
+        rest = ticked(session, ticked(session, braking, cmd.Pause()), ticks=150)
+        assert rest.motion.at_rest
+        resumed = ticked(session, ticked(session, rest, cmd.Resume()), ticks=5)
+        assert resumed.setpoint.tobytes() == rest.setpoint.tobytes()
+
+
 @pytest.fixture
 def paused(session: Session, state: State) -> State:
     """Return a state after a pause in a motion."""

@@ -82,20 +82,6 @@ def test_no_command_of_the_server_itself_moves_the_arm(session: Session, state: 
         assert not after.moving, example
 
 
-def test_stopped_arm_accepts_exactly_the_declared_commands(session: Session, state: State) -> None:
-    stopped = session.step(state, [cmd.Stop()], state.t)
-    commands: list[cmd.Command] = examples(session, state)
-    assert {type(command) for command in commands} == set(KINDS)
-    for example in commands:
-        # A five-axis arm has no use for a rotation, and no arm angle.
-        if example.traits.while_stopped or isinstance(example, cmd.Orient | cmd.TurnElbow):
-            continue
-        after = session.step(stopped, [example], stopped.t)
-        same = ("goal", "mode", "findings", "stopped", "gripper_goal", "tool")
-        for field in same:
-            assert getattr(after, field) is getattr(stopped, field), (example, field)
-
-
 def test_mailbox_keeps_only_the_newest_of_a_stream(session: Session, state: State) -> None:
     for command in examples(session, state):
         mailbox = Mailbox(lambda _: None)
