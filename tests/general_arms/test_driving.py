@@ -16,17 +16,15 @@ from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.tool_targets import with_branch
 from katana450.arm.control.state.messages import sentence
-from katana450.arm.control.state.state import Reason, State, Status, Verdict
+from katana450.arm.control.state.state import Reason, Status, Verdict
 from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
-from katana450.extensions.recording.codec import Codec
-from katana450.extensions.recording.forms import json_form, json_text
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, joint_frames
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame, singular_values
-from tests.general_arms.driven import TICK, begun, pose, ready, run, session_of, settled
+from tests.general_arms.driven import begun, pose, ready, run, session_of, settled
 from tests.general_arms.published_arms import (
     FOUR,
     OPENMANIPULATOR_X,
@@ -36,6 +34,7 @@ from tests.general_arms.published_arms import (
     SKEWED,
     UR5E,
 )
+from tests.ticks import TICK
 
 ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED}
 SIX_AND_MORE = {**SIX, **SEVEN, **SKEWED}
@@ -303,18 +302,3 @@ def test_drag_beside_the_base_is_held_at_a_singularity_and_says_so() -> None:
     state = settled(session, start, [cmd.Orient(turned)])
     assert state.branch == start.branch
     assert str(session.require_arm().kinematics.branch_of(state.goal)) == start.branch
-
-
-def test_state_of_a_drag_and_its_commands_are_recorded_to_the_bit() -> None:
-    session, codec = session_of(UR5E), Codec()
-    start = begun(session)
-    far = cmd.Position(pose(session, start)[:3, 3] + (0.6, 0.3, 0.2))
-    state = session.step(start, [far], TICK)
-    text = json_text(codec.encoded(state))
-    again = codec.decoded(State, json_form(text))
-    assert json_text(codec.encoded(again)) == text
-    following, repeated = (session.step(before, [], 2 * TICK) for before in (state, again))
-    np.testing.assert_array_equal(following.goal, repeated.goal)
-    for command in (cmd.Orient(TURN), cmd.Branch(name="left-up-noflip")):
-        form = json_text(codec.encoded(command))
-        assert type(codec.decoded(cmd.Command, json_form(form))) is type(command)

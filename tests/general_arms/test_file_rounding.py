@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.commands import commands as cmd
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.general_arms.choice import kinematics_of
@@ -24,7 +23,6 @@ from katana450.maths.kinematics.forward import forward
 from katana450.settings import Settings
 from tests.general_arms import singular_postures as singular
 from tests.general_arms.chain_urdf import chain_urdf
-from tests.general_arms.driven import begun, pose, session_of, settled
 from tests.general_arms.published_arms import (
     IIWA_7,
     KR_6,
@@ -155,16 +153,6 @@ def test_pose_out_of_reach_keeps_the_nearest_postures(tmp_path: Path) -> None:
     ):
         assert not one.exact
         assert one.position_error == pytest.approx(other.position_error, abs=1e-6)
-
-
-@pytest.mark.parametrize("name", ["UR5e", "iiwa"])
-def test_tool_of_such_an_arm_is_driven(tmp_path: Path, name: str) -> None:
-    session = session_of(chain_in(tmp_path, ARMS[name]))
-    state = begun(session)
-    goal = pose(session, state)[:3, 3] + (0.02, 0.03, -0.04)
-    state = settled(session, state, [cmd.Position(goal)])
-    assert not state.findings
-    np.testing.assert_allclose(pose(session, state)[:3, 3], goal, atol=1e-7)
 
 
 def test_map_counts_the_poses_of_such_an_arm(tmp_path: Path) -> None:

@@ -97,6 +97,8 @@ def test_score_has_the_measures_of_the_tool(
 def test_motion_runs_again(
     path: Path, urdf: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    assert main(["record", "verify", str(path), "--urdf", str(urdf)]) == 0
+    assert "identical to the bit" in capsys.readouterr().out
     script = tmp_path / "again.yaml"
     command = ["record", "again", str(path), "--urdf", str(urdf), "--out", str(script)]
     assert main(command) == 0
