@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 
 from tests.robot.public_arms import PX100, PX150, QUARTER, UR5, VX300S, J, X, Y, written
+from tests.view.conftest import server
+
+__all__ = ["server"]
 
 TWISTED = [
     J("one", "revolute", "base", "l1", (0.0, 0.0, 0.1)),

@@ -15,8 +15,7 @@ from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-
-TICK = 0.01
+from tests.ticks import ticked
 
 
 def session_of(chain: Chain) -> Session:
@@ -34,11 +33,7 @@ def run(
     session: Session, state: State, commands: Iterable[cmd.Command] = (), ticks: int = 1
 ) -> State:
     """Return ``state`` after some ticks; the commands come with the first."""
-    for _ in range(ticks):
-        state = session.step(state, commands, state.t + TICK)
-        commands = ()
-        state = session.observe(state, state.setpoint, 0.0)
-    return state
+    return ticked(session, state, *commands, ticks=ticks)
 
 
 def settled(session: Session, state: State, commands: Iterable[cmd.Command] = ()) -> State:

@@ -18,7 +18,7 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.plan import Plan
-from tests.general_arms.driven import TICK, begun, session_of
+from tests.general_arms.driven import begun, session_of
 from tests.general_arms.published_arms import (
     IIWA_7,
     KR_6,
@@ -30,6 +30,7 @@ from tests.general_arms.published_arms import (
     SKEWED_7,
     UR5E,
 )
+from tests.ticks import TICK
 
 SOME = {"UR5e": UR5E, "KR 6": KR_6, "Panda": PANDA, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}
 REST = {

@@ -2,30 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import json
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from katana450.cli.main import main
+from tests.cli.lines import ask
 
 Urdf = Callable[[str], Path]
-
-
-def ask(command: str, lines: Sequence[object], *options: str) -> list[dict[str, Any]]:
-    """Return the answers to ``lines``, which are sent as JSON."""
-    text = "".join(json.dumps(line) + "\n" for line in lines)
-    out = io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(out):
-        patch.setattr(sys, "stdin", io.StringIO(text))
-        main([command, *options])
-    return [json.loads(line) for line in out.getvalue().splitlines()]
 
 
 Q = [0.3, -0.8, 1.1, 0.4, 0.7, -0.5]
@@ -71,7 +56,7 @@ def test_tool_and_orientation_are_chosen_in_the_line(urdf: Urdf) -> None:
     ],
 )
 def test_wrong_line_of_fk_is_refused(urdf: Urdf, line: object, message: str) -> None:
-    (answer,) = ask("fk", [line], "--urdf", str(urdf("ur5")))
+    (answer,) = ask("fk", [line], "--urdf", str(urdf("ur5")), status=1)
     assert answer["error"].startswith("line 1: ")
     assert message in answer["error"]
 
@@ -86,5 +71,5 @@ def test_wrong_line_of_fk_is_refused(urdf: Urdf, line: object, message: str) -> 
     ],
 )
 def test_wrong_line_of_ik_is_refused(urdf: Urdf, line: object, message: str) -> None:
-    (answer,) = ask("ik", [line], "--urdf", str(urdf("ur5")))
+    (answer,) = ask("ik", [line], "--urdf", str(urdf("ur5")), status=1)
     assert message in answer["error"]

@@ -18,7 +18,7 @@ from katana450.maths.geometry import se3
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.path import joint_derivatives
-from tests.general_arms.driven import TICK, session_of
+from tests.general_arms.driven import session_of
 from tests.general_arms.programs import (
     begin_plan,
     every,
@@ -36,6 +36,7 @@ from tests.general_arms.published_arms import (
     UR5E,
     craig,
 )
+from tests.ticks import TICK
 
 THREE_AXES = craig(
     [

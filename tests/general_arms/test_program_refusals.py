@@ -20,7 +20,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.path import joint_derivatives
-from tests.general_arms.driven import TICK, pose, session_of
+from tests.general_arms.driven import pose, session_of
 from tests.general_arms.programs import (
     REST,
     angles_of,
@@ -32,6 +32,7 @@ from tests.general_arms.programs import (
     program,
 )
 from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA, PUMA_560, UR5E
+from tests.ticks import TICK
 
 
 @every({"UR5e": UR5E, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}, {"KR 6": KR_6, "Panda": PANDA})

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import threading
-from contextlib import redirect_stdout
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -42,37 +40,29 @@ def test_example_is_valid_for_editors() -> None:
     assert "$schema=../script.schema.json" in text
 
 
-def test_preview_and_trace_show_the_curves(ur5e_file: Path) -> None:
+def test_preview_and_trace_show_the_curves(server: viser.ViserServer, ur5e_file: Path) -> None:
     plan = plan_script(parse(script_text(SCRIPT)), ur5e_file)
     states = run_by_clock(plan).states
-    with redirect_stdout(StringIO()):
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
-        preview = Preview(server, plan.robot, lambda: plan.session)
-        span = preview.show(plan.program, plan.start)
-        assert span == pytest.approx(states[-1].t, abs=0.3)
-        preview.look(0.5 * span)
-        for thread in [
-            candidate for candidate in threading.enumerate() if candidate.name == "preview"
-        ]:
-            thread.join(30.0)
-        traces = Traces(server, plan.robot.require_arm())
-        for state in states:
-            traces.follow(state)
-        nodes = internals.nodes(server)
-        traced = nodes["/path/traced"]
-        assert isinstance(traced, viser.LineSegmentsHandle)
-        assert traced.visible
-        # Green all along: the tool is on its curve.
-        assert (traced.colors.reshape(-1, 3) == coloured(np.zeros(1))).all()
-        shown = nodes["/path/preview"]
-        assert isinstance(shown, viser.LineSegmentsHandle)
-        down = shown.points.reshape(-1, 3)[:, 2].min()
-        assert down == pytest.approx(0.2, abs=1e-3)
-        preview.begin()
-    finally:
-        with redirect_stdout(StringIO()):
-            server.stop()
+    preview = Preview(server, plan.robot, lambda: plan.session)
+    span = preview.show(plan.program, plan.start)
+    assert span == pytest.approx(states[-1].t, abs=0.3)
+    preview.look(0.5 * span)
+    for thread in [candidate for candidate in threading.enumerate() if candidate.name == "preview"]:
+        thread.join(30.0)
+    traces = Traces(server, plan.robot.require_arm())
+    for state in states:
+        traces.follow(state)
+    nodes = internals.nodes(server)
+    traced = nodes["/path/traced"]
+    assert isinstance(traced, viser.LineSegmentsHandle)
+    assert traced.visible
+    # Green all along: the tool is on its curve.
+    assert (traced.colors.reshape(-1, 3) == coloured(np.zeros(1))).all()
+    shown = nodes["/path/preview"]
+    assert isinstance(shown, viser.LineSegmentsHandle)
+    down = shown.points.reshape(-1, 3)[:, 2].min()
+    assert down == pytest.approx(0.2, abs=1e-3)
+    preview.begin()
 
 
 def test_robot_without_a_tool_runs_no_script(tmp_path: Path) -> None:

@@ -23,6 +23,9 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
+from tests.view.conftest import server
+
+__all__ = ["server"]
 
 TICK = 0.01
 

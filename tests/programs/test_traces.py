@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
-import pytest
 import viser
 
 from katana450.arm.control.commands import commands as cmd
@@ -25,14 +23,6 @@ from katana450.extensions.programs.server.traces import (
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.settings import Settings
-from tests.browser.server import free_port
-
-
-@pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(port=free_port(), verbose=False)
-    yield server
-    server.stop()
 
 
 def test_trace_follows_the_arc(server: viser.ViserServer, arm: MountedArm) -> None:
