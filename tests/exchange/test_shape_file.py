@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import sys
 from pathlib import Path
@@ -97,16 +96,6 @@ def test_a_whole_world_is_flattened() -> None:
         assert np.unique(shape.colours, axis=0).tolist() == [[255, 128, 0, 191]]
     castle, ours = (triangles(shape.vertices * 1e3, shape.faces, 3) for shape in shapes)
     assert castle == ours
-
-
-@pytest.mark.parametrize("file", ["gmsh.stl", "meshlab.stl", "meshlab.ply", "assimp.glb"])
-def test_another_reader_finds_the_same_triangles(file: str) -> None:
-    data = (FOREIGN / file).read_bytes()
-    shape = read_shape(data, Format.of(file), file, 1e-3, Up.Z)
-    other = trimesh.load_mesh(io.BytesIO(data), file_type=file[-3:], process=False)
-    assert triangles(shape.vertices * 1e3, shape.faces, 3) == triangles(
-        other.vertices, other.faces, 3
-    )
 
 
 def written(mesh: trimesh.Trimesh, kind: str) -> bytes:

@@ -20,7 +20,6 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import pitch_and_roll, pitched_frame
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
-from tests.browser.server import APP, AppServer
 from tests.cli.lines import ask
 from tests.robot.urdf_files import edited, saved
 
@@ -121,12 +120,6 @@ def test_links_without_shapes_are_drawn_as_rods() -> None:
     np.testing.assert_allclose(box.mesh.bounds.mean(axis=0), [0.0165, 0.0, 0.0], atol=1e-12)
     assert "foot" not in robot.moving
     assert "tip" in robot.moving
-
-
-def test_it_is_served() -> None:
-    with AppServer((*APP, "--urdf", str(PINCHER))) as server:
-        assert server.running
-        assert "Traceback" not in server.output
 
 
 def test_kinematics_are_answered_line_by_line() -> None:

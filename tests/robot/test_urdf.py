@@ -15,8 +15,6 @@ from katana450.settings import Settings
 from tests.commands import modules_after, output
 from tests.robot.public_arms import PX150, J, urdf, written
 
-ARMS = Path(__file__).parent / "arms"
-
 EVERYTHING = """<robot name="all of it">
   <material name="sky"><color rgba="0.2 0.4 1.0 0.5"/></material>
   <material name="none"/>
