@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import kinematics_report as report
-from benchmarks.kinematics import ROOT, main, measure, seeded_task
+from benchmarks.kinematics import ROOT, measure, seeded_task
 from benchmarks.kinematics_own import Floor
 from benchmarks.kinematics_quality import quality
 from benchmarks.kinematics_report import Tables
@@ -62,36 +58,3 @@ def test_wrong_answers_and_doubles_do_not_count() -> None:
     missed = quality(chain, task.T, [np.array([wrong])])
     assert missed.solved == missed.branches == missed.usable == 0.0
     assert quality(chain, task.T, [np.empty((0, 5))]).solved == 0.0
-
-
-def test_the_tables_go_between_the_marks(tables: Tables, tmp_path: Path) -> None:
-    document = tmp_path / "benchmarks.md"
-    document.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n", encoding="utf-8")
-    report.write_into(document, tables)
-    first = document.read_text(encoding="utf-8")
-    assert "old" not in first
-    assert first.startswith("before\n")
-    assert first.endswith("\nafter\n")
-    assert "| katana450 `arm.ik` |" in first
-    report.write_into(document, tables)
-    assert document.read_text(encoding="utf-8") == first
-    document.write_text("no marks", encoding="utf-8")
-    with pytest.raises(ValueError, match="must hold the lines"):
-        report.write_into(document, tables)
-
-
-def test_the_command_prints_both_tables_and_writes_json(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    options = ("--poses", "4", "--blocks", "2", "--solvers", "katana450", "floor")
-    written = ("--json", str(tmp_path / "figures.json"))
-    monkeypatch.setattr(sys, "argv", ["kinematics", *options, *written])
-    main()
-    printed = capsys.readouterr().out
-    assert "One pose a call" in printed
-    assert "in one call" in printed
-    figures = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
-    (row,) = figures["one_by_one"]
-    assert row["solver"] == "katana450 `arm.ik`"
-    assert row["least_microseconds"] == min(row["microseconds"])
-    assert {row["solver"] for row in figures["batch"]} == {"C, `-O3`", "katana450 `arm.ik`"}

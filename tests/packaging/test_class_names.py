@@ -67,27 +67,3 @@ def test_class_defined_twice_has_a_reason_in_the_glossary() -> None:
 
 def test_glossary_lists_no_name_with_one_class() -> None:
     assert not listed() - defined_twice(PACKAGE), "take these names out of docs/glossary.md"
-
-
-def test_duplicate_is_found_across_modules(tmp_path: Path) -> None:
-    (tmp_path / "inner").mkdir()
-    (tmp_path / "one.py").write_text("class A: ...\nclass B: ...\nclass _C: ...\n")
-    (tmp_path / "inner" / "two.py").write_text("class A: ...\nclass _C: ...\n")
-    assert defined_twice(tmp_path) == {"A"}
-
-
-def test_command_request_and_step_share_a_name_once_each(tmp_path: Path) -> None:
-    step = "class {}(Step):\n    def build(self): ...\n"
-    one = "class A(Command): ...\nclass B(Command): ...\nclass C(Command): ...\n"
-    (tmp_path / "one.py").write_text(one)
-    (tmp_path / "two.py").write_text(
-        "class A(Request, frozen=True): ...\nclass B(AxisCommand): ...\nclass C: ...\n"
-    )
-    (tmp_path / "three.py").write_text(step.format("A"))
-    assert defined_twice(tmp_path) == {"B", "C"}
-
-
-def test_reason_counts_only_in_its_section_and_with_words() -> None:
-    before, after = "- `A`: before\n\n", "## Next\n\n- `D`: after\n"
-    section = f"{SECTION}\n\n### Group\n\n- `B`: a reason.\n- `C`:\n\n"
-    assert with_a_reason(before + section + after) == {"B"}
