@@ -21,8 +21,6 @@ SIDE = 0.05
 
 HALF = 0.5 * SIDE
 CUBE = box((SIDE, SIDE, SIDE))
-STILL = np.zeros(1)
-"""The place of an arm that does not move."""
 
 MAX_GRIP = 1e-4
 """[m] Motion of a body that stands still."""

@@ -141,15 +141,6 @@ def test_object_out_of_reach_is_reported_in_the_frame_of_the_script(stage: Stage
     assert "mm in the base frame" in why
 
 
-def test_nearest_place_is_possible(stage: Stage) -> None:
-    move = "steps:\n  - move: "
-    with pytest.raises(ScriptError) as refused:
-        stage.planned(f"{move}{{x: 700, y: 0, z: 0}}")
-    _, remedy, rest = str(refused.value).split("`")
-    assert rest == " with this pitch."
-    stage.planned(f"{move}{remedy}")
-
-
 def test_farthest_place_of_a_line_is_named(stage: Stage) -> None:
     """At 78 % the arm is stretched; axis 2 is at its limit long before."""
     why = refusal(stage, "  - line: {by: {z: -500}}\n", "shoulder")

@@ -92,18 +92,6 @@ def test_a_timeline_agrees_with_the_run(stage: Stage, program: Program) -> None:
         assert np.abs(run_by - q).max(axis=1).min() < 0.02
 
 
-def test_every_plan_is_clear_and_joins_the_next(program: Program) -> None:
-    q = program.start
-    for task in program.tasks:
-        if isinstance(task.action, FollowPlan):
-            plan = task.action.plan
-            assert np.abs(plan.start - q).max() < 1e-6
-            assert plan.clear_of is not None
-            assert plan.nearest is not None
-            assert plan.nearest.contact.distance > 5e-3
-            q = plan.end
-
-
 def test_a_pause_stays_on_the_path_and_does_not_count_as_waiting(
     stage: Stage, program: Program
 ) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,7 +12,6 @@ from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.trajectory_path import CubicSpline, TrajectoryPath
 from katana450.extensions.programs.run.program import Program
@@ -34,7 +31,6 @@ from tests.programs.test_continuation import (
     stopped_after,
 )
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "programs" / "wave.yaml"
 READY = (0.0, -68.0, 85.0, 8.0, 0.0)
 
 
@@ -96,10 +92,6 @@ def test_row_with_a_repeated_time_is_named(
     rows = [[t, float(number), *READY[1:]] for number, t in enumerate(times)]
     with pytest.raises(ScriptError, match=rf"Row {row} has the time {times[row - 1]} s\."):
         stage.planned(script(rows))
-
-
-def begun(stage: Stage) -> tuple[PlanContext, State]:
-    return stage.plan_context, stage.begin()
 
 
 def test_gentle_trajectory_keeps_its_times(stage: Stage) -> None:
@@ -224,14 +216,6 @@ def test_fingers_must_hold_what_is_named(stage: Stage) -> None:
     text = "steps:\n  - gripper: open\n  - gripper: {to: closed, holding: cup}\n"
     with pytest.raises(ScriptError, match="hold nothing instead of cup"):
         stage.planned(text)
-
-
-def test_example_runs(stage: Stage) -> None:
-    program = stage.planned(EXAMPLE.read_text(encoding="utf-8"))
-    path, span = plan_of(program)
-    assert span >= path.duration == 3.0
-    run, _ = stage.play(program, stage.begin())
-    assert run.phase is Phase.DONE
 
 
 @pytest.mark.parametrize(

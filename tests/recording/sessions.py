@@ -21,9 +21,6 @@ from tests.recording.recorded import PERIOD, described, header, run
 Commands = Callable[[int, State], Iterator[cmd.Command]]
 """Function from the number of a tick and the state before it to the commands of the tick."""
 
-STEP = 0.004
-"""[m] Motion of the target of a drag in a tick."""
-
 
 def record_session(
     path: Path, ticks: int, commands: Commands, driver: Driver | None = None

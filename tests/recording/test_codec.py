@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import run_state_machine_as_test
 from msgspec import Struct, msgpack
 
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
@@ -23,7 +22,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import classes_of
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.modes import IDLE, Target, Tracking
+from katana450.arm.control.state.modes import Target, Tracking
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.solid import Solid
 from katana450.arm.control.state.state import Finding, Reason, State
@@ -46,7 +45,6 @@ from katana450.extensions.recording.forms import FormError, json_form, json_text
 from katana450.extensions.recording.ticks import Digester
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
-from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path
@@ -57,7 +55,6 @@ from katana450.maths.water.motion import Course, MotionWithWater, VesselMotion
 from katana450.maths.water.units import ML
 from katana450.settings import Settings
 from tests.conftest import LONG
-from tests.control.test_session_machine import ArmRules, bounded
 from tests.control.test_traits import KINDS, examples
 
 
@@ -234,27 +231,6 @@ def test_whole_number_in_place_of_a_float_stays_one() -> None:
     back = copied(cmd.Command, cmd.Joint(2, 2))
     assert type(back.value) is int
     assert type(copied(cmd.Command, cmd.Gripper(np.float64(0.1))).angle) is float
-
-
-class RecordedRules(ArmRules):
-    """Random commands to a session whose state is read from its text every few ticks."""
-
-    names = ("shipped", "bare")
-    every = 20
-
-    def tick(self, commands: Iterable[cmd.Command]) -> None:
-        super().tick(commands)
-        if len(self.log) % self.every == 0:
-            back = copied(State, self.state)
-            digester = Digester()
-            assert digester.digest(back) == digester.digest(self.state)
-            assert (back.mode is IDLE) == (self.state.mode is IDLE)
-            # At the end the same commands give the same state without this.
-            self.state = back
-
-
-def test_random_sessions_continue_from_the_text_of_their_states() -> None:
-    run_state_machine_as_test(RecordedRules, settings=bounded(2, 40))
 
 
 WRONG: st.SearchStrategy[Any] = st.sampled_from(
@@ -470,10 +446,3 @@ def test_values_of_other_classes_are_refused(state: State) -> None:
         form_of(Other)
     with pytest.raises(FormError, match="not a number of 64 bits"):
         Codec().encoded(replace(state, gripper=10**40))
-
-
-def test_kinematics_of_a_read_chain_are_the_same(follow: cmd.Follow) -> None:
-    chain = copied(cmd.Command, follow).plan.segments[0].path.chain
-    q = np.array((0.1, -0.9, 1.2, 0.3, 0.4))
-    mine = follow.plan.segments[0].path.chain
-    assert forward(chain, q).tobytes() == forward(mine, q).tobytes()

@@ -41,7 +41,6 @@ from tests.recording.dataset_files import write_copy
 from tests.recording.recorded import described, header, run
 from tests.recording.sessions import drag, program, record_session
 
-GANTRY = Path(__file__).parents[1] / "exchange" / "gantry.urdf"
 TOLERANCE = 1.5e-4
 """[rad] Distance of a run from the recorded setpoints: that of the spline, and of its ticks."""
 

@@ -24,8 +24,6 @@ from robot_description.cad.material import ALUMINIUM, MATERIALS, RUBBER
 from robot_description.cad.part import Part
 from robot_description.cad.solid import block, lathe, rod
 
-ARM_MASS = 4.80  # kg, weighed, without the control box
-
 
 def as_trimesh(solid: Manifold) -> trimesh.Trimesh:
     mesh = solid.to_mesh64()
