@@ -113,6 +113,7 @@ class BodySimulation:
         option, solver = self._compiled.opt, int(mujoco.mjtSolver.mjSOL_CG)
         self._quick = {"solver": solver, "iterations": HEAP_ITERATIONS}
         self._exact = {name: getattr(option, name) for name in self._quick}
+        self._is_quick = False
         self._names = tuple(body.name for body in bodies)
         self._radii = np.array([_radius(body) for body in bodies])
         self._insides = [_inside(body) for body in bodies]
@@ -299,8 +300,10 @@ class BodySimulation:
 
     def _choose_solver(self, *, quick: bool) -> None:
         """Choose how exact the forces between bodies are."""
-        for name, value in (self._quick if quick else self._exact).items():
-            setattr(self._compiled.opt, name, value)
+        if quick is not self._is_quick:
+            self._is_quick = quick
+            for name, value in (self._quick if quick else self._exact).items():
+                setattr(self._compiled.opt, name, value)
 
     def _fix(self, resting: BoolArray, parting: BoolArray) -> None:
         """Make the bodies at rest heavy, so that nothing moves them, and let them meet no other.
@@ -333,10 +336,9 @@ class BodySimulation:
         """
         if not self._model.links:
             return
-        start, end = self._twists(x, rates, 0), self._twists(towards, rates, 1)
-        place, first, last = start.places, start.twists, end.twists
-        if rates is None:
-            first = last = _between(place, end.places, dt)
+        first_rate, last_rate = rates or ((towards - x) / dt,) * 2
+        start, last = self._links(x, first_rate), self._links(towards, last_rate).twists
+        place, first = start
         acceleration = (last - first) / dt
         data, count, links = self._data, len(self._names), len(place)
         q = data.qpos[7 * count : 7 * (count + links)].reshape(-1, 7)
@@ -347,22 +349,24 @@ class BodySimulation:
         # The engine moves by the speed at the end of a step.
         q[:], v[:], force[:] = place, first - 0.5 * h * acceleration, LINK_MASS * acceleration
 
-    def _twists(self, x: FloatArray, rates: Rates | None, end: int) -> _Links:
-        """Return the links at ``x`` (k,) with the rates at one ``end`` of the step."""
-        place = self._places(x)
-        if rates is None:
-            return _Links(place, np.zeros((len(place), 6)))
-        step = DIFFERENCE * rates[end]
-        return _Links(place, _between(place, self._places(x + step), DIFFERENCE))
+    def _links(self, x: FloatArray, rate: FloatArray) -> _Links:
+        """Return the links at ``x`` (k,), which changes by ``rate`` (k,) [rad/s or m/s]."""
+        import mujoco
 
-    def _places(self, x: FloatArray) -> FloatArray:
-        """Return position and quaternion of each link at ``x`` (k,), (l, 7)."""
-        poses = self._linkage.poses(x)[list(self._model.links)]
-        places = np.empty((len(poses), 7))
-        places[:, :3] = np.einsum("lij,lj->li", poses[:, :3, :3], self._model.origins)
-        places[:, :3] += poses[:, :3, 3]
-        places[:, 3:] = [so3.to_quaternion(T[:3, :3]) for T in poses]
-        return places
+        links, origins = list(self._model.links), self._model.origins
+        poses = self._linkage.poses(x)[links]
+        places, twists = np.empty((len(poses), 7)), np.zeros((len(poses), 6))
+        places[:, :3] = _points(poses, origins)
+        for place, T in zip(places, poses, strict=True):
+            mujoco.mju_mat2Quat(place[3:], T[:3, :3].ravel())
+        if rate.any():
+            later = self._linkage.poses(x + DIFFERENCE * rate)[links]
+            turns = poses[:, :3, :3].swapaxes(1, 2) @ later[:, :3, :3]
+            twists[:, :3] = (_points(later, origins) - places[:, :3]) / DIFFERENCE
+            # The engine has the angular velocity in the frame of each link.
+            hats = 0.5 * (turns - turns.swapaxes(1, 2)) / DIFFERENCE
+            twists[:, 3:] = hats[:, (2, 0, 1), (1, 2, 0)]
+        return _Links(places, twists)
 
     def _drive_goals(
         self,
@@ -469,8 +473,8 @@ class BodySimulation:
     def _deep(self) -> BoolArray:
         """Return which bodies (b,) have contacts deeper than DEEP."""
         data, deep = self._data, np.zeros(len(self._names), dtype=bool)
-        if data.ncon:
-            contact = data.contact
+        contact = data.contact
+        if data.ncon and contact.dist.min() < -DEEP:
             bodies = self._compiled.geom_bodyid[contact.geom[contact.dist < -DEEP]].ravel() - 1
             deep[bodies[(bodies >= 0) & (bodies < len(deep))]] = True
         return deep
@@ -481,8 +485,11 @@ class BodySimulation:
         ``before``: (b, 7) their places before the step, which they leave no faster.
         """
         data, count = self._data, len(self._names)
-        place = data.qpos[: 7 * count].reshape(-1, 7)
         v = data.qvel[: 6 * count].reshape(-1, 2, 3)
+        # No velocity is longer than twice its largest part.
+        if 2.0 * np.abs(v).max(initial=0.0) < (PARTING_SPEED if deep.any() else MAX_SPEED):
+            return
+        place = data.qpos[: 7 * count].reshape(-1, 7)
         limits = np.where(deep, PARTING_SPEED, MAX_SPEED)[:, None]
         speeds = np.sqrt(np.einsum("bij,bij->bi", v, v))
         limits = limits * (1.0, 10.0)
@@ -496,16 +503,9 @@ class BodySimulation:
         place[fast, 3:] /= np.linalg.norm(place[fast, 3:], axis=1)[:, None]
 
 
-def _between(places: FloatArray, others: FloatArray, dt: float) -> FloatArray:
-    """Return the twists (l, 6) that lead from ``places`` (l, 7) to ``others`` in ``dt`` [s].
-
-    The angular velocity is in the frame of each link, as the engine has it.
-    """
-    turns = [
-        so3.log(so3.from_quaternion(one[3:]).T @ so3.from_quaternion(other[3:]))
-        for one, other in zip(places, others, strict=True)
-    ]
-    return np.hstack((others[:, :3] - places[:, :3], np.array(turns).reshape(-1, 3))) / dt
+def _points(poses: FloatArray, origins: FloatArray) -> FloatArray:
+    """Return the points ``origins`` (l, 3) of links at ``poses`` (l, 4, 4) in the base frame."""
+    return np.asarray(np.einsum("lij,lj->li", poses[:, :3, :3], origins) + poses[:, :3, 3])
 
 
 def _is_slow(velocity: FloatArray, speed: float) -> BoolArray:

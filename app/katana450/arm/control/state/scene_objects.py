@@ -160,15 +160,9 @@ class SceneObject:
     @property
     def collision_shape(self) -> CollisionShape:
         """Shape for collision checks, about the middle of the object."""
-        match self.shape:
-            case Shape.BOX:
-                return box(self.extent)
-            case Shape.CYLINDER | Shape.VESSEL:
-                return cylinder(*self.extent)
-            case Shape.SPHERE:
-                return sphere(self.extent[0])
-        assert self.solid is not None
-        return _hull(self.solid.corners.tobytes(), self.scale, 0.5 * self.height)
+        if self.solid is not None:
+            return _hull(self.solid.corners.tobytes(), self.scale, 0.5 * self.height)
+        return _simple_shape(self.shape, self.extent)
 
     @property
     def T_collision_shape(self) -> FloatArray:
@@ -177,12 +171,21 @@ class SceneObject:
         return self.T @ up
 
 
+# Cached because an object that moves is created again at every step.
+@lru_cache(maxsize=2 * MAX_OBJECTS)
+def _simple_shape(shape: Shape, extent: tuple[float, ...]) -> CollisionShape:
+    """Return a box, cylinder or ball about its middle."""
+    match shape:
+        case Shape.BOX:
+            return box(extent)
+        case Shape.SPHERE:
+            return sphere(extent[0])
+    return cylinder(*extent)
+
+
 @lru_cache(maxsize=2 * MAX_OBJECTS)
 def _hull(corners: bytes, scale: float, middle: float) -> CollisionShape:
-    """Return the hull of a solid about its middle.
-
-    Cached because an object that is dragged is created again at every step.
-    """
+    """Return the hull of a solid about its middle."""
     points = scale * np.frombuffer(corners).reshape(-1, 3)
     return hull(points - (0.0, 0.0, middle))
 
