@@ -220,8 +220,7 @@ class Grasp(Step, word="grasp"):
         """Plan the grasp at ``grip`` on ``branch``. Raises InputError if it is not possible."""
         hand, point = plan.hand, _point(plan, scene_object, grip.height)
         distance, q = _smallest_distance(plan, point, approach, grip.distance, branch)
-        # Before the path there, whose planning takes longer.
-        self._closed(plan, q)
+        held = self._closed(plan, q)
 
         def start_at(plan: PlanState, away: float) -> FloatArray:
             before = hand.before(point, approach, distance + away)
@@ -236,13 +235,15 @@ class Grasp(Step, word="grasp"):
         plan = plan.move_to(start, f"grasp {self.name}: approach")
         goal = hand.before(point, approach, distance)
         plan = plan.lead([line_between(plan.target, goal)], f"grasp {self.name}")
-        # With more than six axes, the pose alone is given.
-        if not hand.is_redundant and float(np.abs(plan.q - q).max()) > JOIN_TOLERANCE:
-            raise InputError("the straight path to it ends in another posture than planned.")
-        closed, held = plan.plan_context.arm.gripper.closed, self._closed(plan, plan.q)
+        if float(np.abs(plan.q - q).max()) > JOIN_TOLERANCE:
+            if not hand.is_redundant:
+                raise InputError("the straight path to it ends in another posture than planned.")
+            held = self._closed(plan, plan.q)
+        held = replace(plan, state=held).standing(plan.q).state
         holding = "" if self._checked_later(plan.ahead) else self.name
-        plan = plan.with_action(f"grasp {self.name}: close", MoveFingers(closed, holding), held)
-        chosen = approach if self.pitch is None else None
+        close = MoveFingers(plan.plan_context.arm.gripper.closed, holding)
+        plan = plan.with_action(f"grasp {self.name}: close", close, held)
+        chosen = None if self.pitch is not None else approach
         return replace(plan, taken=GraspInfo(plan.target, chosen, scene_object))
 
     def _closed(self, plan: PlanState, q: FloatArray) -> State:
