@@ -87,6 +87,9 @@ async def act(server: AppServer, tokens: dict[str, str], numbers: dict[str, str]
         await otto.wait(mine=True)
         await drag(peer, 0.0, 0.02, 0.04)
         await otto.say("joint", axis=1, value=0.1)
+        # Two connections have no order, so each speaks after the answer to the other.
+        await otto.say("query")
+        await otto.notice("state")
         await refused(vera, "home")
         await vera.say("stop")
         await otto.wait(stop="confirmed")

@@ -25,7 +25,7 @@ from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES, Outcomes
-from katana450.arm.runtime.pipes.arm_end import ArmEnd, CommandMessage, Heartbeat
+from katana450.arm.runtime.pipes.arm_end import ArmEnd, CommandMessage
 from katana450.arm.runtime.pipes.arm_listener import FRONT, Greeting
 from katana450.arm.runtime.pipes.front_end import FrontEnd
 from katana450.assembly import running_arm
@@ -126,14 +126,9 @@ def test_arm_that_moves_at_once_was_at_rest(ends: Ends, monkeypatch: pytest.Monk
     front, calls, flush = ends.front, [], ends.front._flush
     front.on_command_at_rest = lambda: calls.append(True)
 
-    def moves() -> bool:
-        # An arm that hears nothing while it waits for the processor would stop.
-        front._send(Heartbeat())
-        return front.state_publisher.snapshot.state.moving
-
     def slow() -> None:
         flush()
-        until(moves)
+        until(lambda: front.state_publisher.snapshot.ticket == 1)
 
     monkeypatch.setattr(front, "_flush", slow)
     front.deliver(cmd.Joint(1, 1.0))
