@@ -49,6 +49,26 @@ def test_comma_of_a_typed_number_is_its_point(page: Page) -> None:
     assert scale.input_value() == "12.5"
 
 
+# First frame
+
+CONTEXTS = """({ FirstFrame }, draws) => {
+    let contexts = 0;
+    const later = [];
+    window.setTimeout = (act) => later.push(act);
+    HTMLCanvasElement.prototype.getContext = () => ++contexts;
+    const frame = new FirstFrame();
+    if (draws) frame.note();
+    for (const act of later) act();
+    return contexts;
+}"""
+"""Returns the number of contexts for drawing that the page makes to see whether it can draw."""
+
+
+def test_page_that_has_drawn_makes_no_context_to_see_whether_it_can(page: Page) -> None:
+    path = "page/first_frame.js"
+    assert [module(page, path, CONTEXTS, draws) for draws in (True, False)] == [0, 1]
+
+
 # Pause and Speed
 
 
