@@ -7,8 +7,9 @@ import json
 import math
 import os
 import random
-from collections.abc import Awaitable, Callable
-from contextlib import AsyncExitStack, suppress
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from operator import attrgetter
 from typing import Any
 
 import msgspec
@@ -21,12 +22,13 @@ from tests.browser.server import AppServer
 from tests.gateway.client import (
     SUBPROTOCOL,
     UPRIGHT,
-    Peer,
     controlling,
     enter,
+    opened,
     page_name,
     websocket,
 )
+from tests.gateway.lines import Lines
 
 MESSAGES = 10_000 if "KATANA450_LONG" in os.environ else 1_000
 """Number of mutants at all sockets together."""
@@ -150,135 +152,73 @@ async def pour_in(count: int, mutant: Callable[[], bytes], line: Callable[[], An
     return lines
 
 
-class WebLine:
-    """A websocket whose answers are ignored, with the other sockets that it needs."""
-
-    def __init__(self, url: str, path: str, **options: Any) -> None:
-        self._url, self._path, self._options = url, path, options
-        self._stack = AsyncExitStack()
-
-    async def __aenter__(self) -> Send:
-        try:
-            return await self._opened()
-        except BaseException:
-            # Of several connections the last was refused.
-            await self._stack.aclose()
-            raise
-
-    async def _opened(self) -> Send:
-        page = page_name()
-        cookie = enter(self._url)
-        if "{page}" in self._path and "viser" in self._path:
-            await self._stack.enter_async_context(controlling(self._url, cookie, page))
-        socket = await self._stack.enter_async_context(
-            websocket(self._url, self._path.format(page=page), cookie, **self._options)
-        )
-
-        async def ignore() -> None:
-            with suppress(ConnectionClosed):
-                async for _ in socket:
-                    pass
-
-        ignoring = asyncio.create_task(ignore())
-        self._stack.callback(ignoring.cancel)
+@asynccontextmanager
+async def web_line(url: str, path: str, **options: Any) -> AsyncIterator[Send]:
+    """Open a websocket whose answers are ignored, with the other sockets that it needs."""
+    page, cookie = page_name(), enter(url)
+    async with AsyncExitStack() as stack:
+        if "viser" in path:
+            await stack.enter_async_context(controlling(url, cookie, page))
+        opening = websocket(url, path.format(page=page), cookie, max_queue=None, **options)
+        socket = await stack.enter_async_context(opening)
 
         async def send(data: bytes) -> None:
-            if self._options.get("subprotocols"):
-                await socket.send(data)
-            else:
-                await socket.send(data.decode(errors="replace"))
+            await socket.send(data if options else data.decode(errors="replace"))
             # Once this is answered, all messages before it were read.
             await (await socket.ping())
 
-        return send
-
-    async def __aexit__(self, *_: object) -> None:
-        await self._stack.aclose()
+        yield send
 
 
-class TcpLine:
-    """A connection to the port for JSON lines, after a valid ``hello``."""
+@asynccontextmanager
+async def tcp_line(port: int) -> AsyncIterator[Send]:
+    """Open a connection to the port for JSON lines, and send a valid ``hello``."""
+    reader, writer = await asyncio.open_connection(HERE, port)
+    ignoring = asyncio.create_task(reader.read())
 
-    def __init__(self, port: int) -> None:
-        self._port = port
+    async def send(data: bytes) -> None:
+        if ignoring.done():
+            raise ConnectionError
+        writer.write(data + b"\n")
+        await writer.drain()
+        await asyncio.sleep(PAUSE)
 
-    async def __aenter__(self) -> Send:
-        self._reader, self._writer = await asyncio.open_connection(HERE, self._port)
-        self._writer.write(b'{"do":"hello","name":"Fuzz"}\n')
-        self._ignoring = asyncio.create_task(self._ignore())
-
-        async def send(data: bytes) -> None:
-            if self._ignoring.done():
-                raise ConnectionError
-            self._writer.write(data + b"\n")
-            await self._writer.drain()
-            await asyncio.sleep(PAUSE)
-
-        return send
-
-    async def _ignore(self) -> None:
-        with suppress(ConnectionError):
-            while await self._reader.read(65_536):
-                pass
-
-    async def __aexit__(self, *_: object) -> None:
-        self._ignoring.cancel()
-        self._writer.close()
-        with suppress(ConnectionError):
-            await self._writer.wait_closed()
+    try:
+        await send(b'{"do":"hello","name":"Fuzz"}')
+        yield send
+    finally:
+        ignoring.cancel()
+        writer.close()
+        await asyncio.gather(ignoring, writer.wait_closed(), return_exceptions=True)
 
 
-async def storm(server: AppServer, lines_port: int, uuids: list[str]) -> dict[str, int]:
-    """Send mutants to all sockets at the same time."""
-    url, fraction = server.url, MESSAGES // 4
-    rngs = [random.Random(seed) for seed in range(4)]
-    kinds: dict[str, tuple[Callable[[], bytes], Callable[[], Any]]] = {
-        "viser": (
+async def storm(server: AppServer) -> list[int]:
+    """Send mutants to all sockets at the same time; return the number of lines of each."""
+    url, rngs = server.url, [random.Random(seed) for seed in range(4)]
+    async with opened(url) as (peer, _):
+        uuids = [control["uuid"] for control in peer.controls.values()]
+    kinds: list[tuple[Callable[[], bytes], Callable[[], Any]]] = [
+        (
             lambda: viser_mutant(rngs[0], uuids),
-            lambda: WebLine(url, "/viser?page={page}", subprotocols=[SUBPROTOCOL]),
+            lambda: web_line(url, "/viser?page={page}", subprotocols=[SUBPROTOCOL]),
         ),
-        "control": (lambda: json_mutant(rngs[1]), lambda: WebLine(url, "/control?page={page}")),
-        "socket": (
-            lambda: json_mutant(rngs[2]),
-            lambda: WebLine(url, "/api/v1/socket?name=Fuzz"),
-        ),
-        "lines": (lambda: json_mutant(rngs[3]), lambda: TcpLine(lines_port)),
-    }
-    counts = await asyncio.gather(*(pour_in(fraction, *kind) for kind in kinds.values()))
-    return dict(zip(kinds, counts, strict=True))
+        (lambda: json_mutant(rngs[1]), lambda: web_line(url, "/control?page={page}")),
+        (lambda: json_mutant(rngs[2]), lambda: web_line(url, "/api/v1/socket?name=Fuzz")),
+        (lambda: json_mutant(rngs[3]), lambda: tcp_line(Lines.port(server))),
+    ]
+    return await asyncio.gather(*(pour_in(MESSAGES // 4, *kind) for kind in kinds))
 
 
-async def learned(url: str) -> list[str]:
-    """Return the numbers of the panel's controls, which every browser gets."""
-    async with websocket(
-        url, f"/viser?page={page_name()}", enter(url), subprotocols=[SUBPROTOCOL]
-    ) as socket:
-        peer = Peer(socket)
-        await peer.learn()
-        return [control["uuid"] for control in peer.controls.values()]
-
-
-def kept(state: answers.State) -> tuple[Any, ...]:
-    """Return the values of ``state`` that only the driver may change."""
-    return (
-        state.q,
-        state.goal,
-        state.gripper,
-        state.tool,
-        state.speed,
-        state.holder,
-        state.stopped,
-    )
+kept = attrgetter("q", "goal", "gripper", "tool", "speed", "holder", "stopped")
+"""Returns the values of a state that only the driver may change."""
 
 
 def test_broken_messages_cause_no_crash_and_no_motion(server: AppServer) -> None:
-    lines_port = int(server.output.rpartition(f"JSON lines on {HERE}:")[2].split(".")[0])
     with connect_program(server.url, "Driver") as arm:
         arm.ask(requests.Acquire())
         before = arm.query(answers.State)
         objects = arm.query(answers.Objects).objects
-        uuids = asyncio.run(learned(server.url))
-        counts = asyncio.run(storm(server, lines_port, uuids))
+        counts = asyncio.run(storm(server))
         print(f"{MESSAGES} messages; lines it took: {counts}")
         after = arm.query(answers.State)
         assert kept(after) == kept(before)
