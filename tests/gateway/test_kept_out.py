@@ -4,132 +4,60 @@ from __future__ import annotations
 
 import math
 import time
-from argparse import Namespace
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, cast
 
 import pytest
-from starlette.exceptions import HTTPException
-from starlette.requests import Request
 
 from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.session.session import Session
 from katana450.errors import InputError
-from katana450.extensions.server_commands.people_requests import PeopleRequests
-from katana450.server.api import requests
 from katana450.server.service import people as people_module
 from katana450.server.service import status
-from katana450.server.service.budget import Budgets
-from katana450.server.service.dispatcher import Dispatcher
-from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.known_pages import MAX_NAME, MAX_PAGES, renamed
-from katana450.server.service.participants import Participant, actor_of
+from katana450.server.service.participants import actor_of
 from katana450.server.service.people import Connection
 from katana450.server.web.access_links import AccessFile
-from katana450.server.web.authenticator import KICKED, LOOPBACK_NAMES, Address, Authenticator
-from katana450.server.web.http_api import Api
+from katana450.server.web.authenticator import KICKED
 from tests.gateway.client import HOUR
-from tests.gateway.test_hub import PAGES, FakeArm, Table
-
-ADDRESS = Address(LOOPBACK_NAMES, any_address=False, secure=False)
-PROGRAM = "a-program-of-this-test"
-
-
-class House:
-    """A hub with an arm, its HTTP interface, and an access file unless ``free``."""
-
-    def __init__(self, folder: Path, session: Session, *, free: bool = False) -> None:
-        self.file = AccessFile.create(folder / "access.json")
-        self.hub = Hub(time.monotonic)
-        self.hub.add_handler(PeopleRequests(self.hub, Namespace()))
-        self.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
-        self.hub.gate.arm = cast(Any, self.arm)
-        access = None if free else self.file
-        self.people = self.hub.people
-        self.people.links = access
-        authenticator = Authenticator(access, 8080, ADDRESS, self.people)
-        self.budgets = Budgets(self.hub.clock)
-        self.api = Api(self.hub, authenticator, self.budgets, Namespace())
-        self.ada = self.join("ada", "Ada", Role.ADMIN)
-
-    def join(self, session: str, name: str, role: Role) -> Participant:
-        return self.hub.join(Identity(session, name, role, session, name), "page", lambda _: None)
-
-    def ask(self, request: requests.Request) -> object:
-        """Execute ``request`` of the admin."""
-        return Dispatcher(self.hub).handle(self.ada, request, self.budgets.of("ada"))
-
-    def number(self, session: str) -> int:
-        """Return the number of a person who is shown."""
-        (number,) = (n for n, identity in self.people.shown.items() if identity.session == session)
-        return number
-
-    async def post(
-        self, body: bytes, token: str = "", meanwhile: Callable[[], object] = lambda: None
-    ) -> int:
-        """Send a request over HTTP; ``meanwhile`` is called before its body arrives."""
-        return (await self.api._do(self.request(body, token, meanwhile))).status_code
-
-    @staticmethod
-    def request(
-        body: bytes, token: str = "", meanwhile: Callable[[], object] = lambda: None
-    ) -> Request:
-        """Return a request of a program."""
-
-        async def receive() -> dict[str, object]:
-            meanwhile()
-            return {"type": "http.request", "body": body, "more_body": False}
-
-        headers = {"x-program": PROGRAM, "authorization": f"Bearer {token}"}
-        raw = [(name.encode(), text.encode()) for name, text in headers.items()]
-        address = ("127.0.0.1", 5)
-        scope = {"type": "http", "query_string": b"", "headers": raw, "client": address}
-        return Request(scope, receive)
-
-
-@pytest.fixture
-def house(tmp_path: Path, session: Session) -> House:
-    return House(tmp_path, session)
+from tests.gateway.test_hub import PAGES, Table
+from tests.gateway.virtual import VirtualServer
 
 
 @pytest.mark.parametrize("revokes", [False, True])
 async def test_request_whose_sender_is_removed_before_its_end_is_refused(
-    house: House, revokes: bool
+    guarded: VirtualServer, file: AccessFile, revokes: bool
 ) -> None:
-    token = house.file.give("Oda", Role.OPERATOR, time.time() + HOUR)
-    (number,) = house.file.grants
+    token = file.give("Oda", Role.OPERATOR, time.time() + HOUR)
+    (number,) = file.grants
 
     def remove() -> None:
         if revokes:
-            house.file.revoke(number)
+            file.revoke(number)
         else:
-            house.people.kick(Identity(number, "Oda", Role.OPERATOR), 60.0)
+            guarded.hub.people.kick(Identity(number, "Oda", Role.OPERATOR), 60.0)
 
-    for do in ("acquire", "release_lease"):
-        assert await house.post(b'{"do": "%s"}' % do.encode(), token) == 200
-    with pytest.raises(HTTPException) as refused:
-        await house.post(b'{"do": "acquire"}', token, remove)
-    assert refused.value.status_code == (401 if revokes else 403)
-    assert house.hub.lease.holder is None
+    async def do(what: str, meanwhile: Callable[[], object] = lambda: None) -> int:
+        body, names = b'{"do": "%s"}' % what.encode(), {"X_Program": "a-program-of-this-test"}
+        names["Authorization"] = f"Bearer {token}"
+        return (await guarded.request("/api/v1/do", body, meanwhile=meanwhile, **names))[0]
+
+    assert (await do("acquire"), await do("release_lease")) == (200, 200)
+    assert await do("acquire", remove) == (401 if revokes else 403)
+    assert guarded.hub.lease.holder is None
 
 
-async def test_http_programs_without_links_are_kept_out_together(
-    tmp_path: Path, session: Session
-) -> None:
-    house = House(tmp_path, session, free=True)
-    assert await house.post(b'{"do": "acquire"}') == 200
-    number = house.number("programs")
-    house.ask(requests.Kick(person=number, seconds=60.0))
-    with pytest.raises(HTTPException, match=KICKED) as refused:
-        await house.post(b'{"do": "heartbeat"}')
-    assert refused.value.status_code == 403
-    assert (await house.api._stop(house.request(b""))).status_code == 204
-    house.ask(requests.Kick(person=number, seconds=0.0))
-    assert await house.post(b'{"do": "heartbeat"}') == 200
+def test_http_programs_without_links_are_kept_out_together(local: VirtualServer) -> None:
+    assert local.post(do="acquire")[0] == 200
+    with local.connect("Ada") as ada:
+        (person,) = (entry.person for entry in ada.people() if entry.drives)
+        ada.kick(person, 60.0)
+        status, refused = local.post("another-program-there", do="heartbeat")
+        assert (status, KICKED in refused["why"]) == (403, True)
+        assert local.ask("/api/v1/stop", data=b"")[0] == 204
+        ada.kick(person, 0.0)
+        assert local.post(do="heartbeat")[0] == 200
 
 
 VERA = Identity("vera", "Vera", Role.VIEWER, "Vera")

@@ -12,7 +12,7 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
@@ -413,11 +413,13 @@ class VirtualServer:
         path: str,
         data: bytes | None = None,
         leaves: asyncio.Event | None = None,
+        meanwhile: Callable[[], object] = lambda: None,
         **headers: Any,
     ) -> tuple[int, dict[str, str], bytes]:
         """Return status, headers and body of a response, as ``client.ask`` does.
 
-        ``leaves``: set when the client closes the connection.
+        ``leaves``: set when the client closes the connection. ``meanwhile``: called before its body
+        arrives.
         """
         scope = self.scope(path, headers) | {"method": "GET" if data is None else "POST"}
         messages = [{"type": "http.request", "body": data or b"", "more_body": False}]
@@ -425,6 +427,7 @@ class VirtualServer:
 
         async def receive() -> dict[str, Any]:
             if messages:
+                meanwhile()
                 return messages.pop()
             await (leaves or asyncio.Event()).wait()
             return {"type": "http.disconnect"}
