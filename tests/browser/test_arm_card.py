@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -33,7 +34,8 @@ class Card:
 
     def __init__(self, stack: ExitStack, windows: Windows, *options: str) -> None:
         self.emulator, port = stack.enter_context(emulator_process(*options))
-        arm = ("--arm", f"tcp://127.0.0.1:{port}")
+        self.log = Path(stack.enter_context(TemporaryDirectory())) / "exchanges.log"
+        arm = ("--arm", f"tcp://127.0.0.1:{port}", "--arm-log", str(self.log))
         self.server = stack.enter_context(AppServer((*APP, *arm)))
         self.truth = Truth(self.server)
         self._windows = windows
@@ -108,6 +110,7 @@ def test_arm_is_engaged_moved_stopped_released_and_lost(
         assert "The connection to the arm was lost." in why
         assert why.endswith("If it moves, use its switch.")
         card.window.keep(artefacts / "arm-card-lost.png")
+    assert b" > 01 18 4b 48" in card.log.read_bytes(), "polynomials are in the log"
     assert card.window.errors == []
 
 

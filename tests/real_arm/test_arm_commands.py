@@ -8,24 +8,17 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from katana450.arm.control.commands.arm_commands import OperateArm
-from katana450.arm.control.state.arm_report import ArmAct
-from katana450.client import Client, connect
 from katana450.extensions.real_arm.codec import requests as req
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.axis import AxisMode
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.exchange_lines import ExchangeDecoder
 from katana450.extensions.real_arm.link import ArmLink, ExchangeLog, TcpTransport
-from katana450.server.api import answers
-from katana450.server.api.answers import MeasuredArm
-from tests.browser.server import APP, AppServer, free_port
+from tests.browser.server import free_port
 from tests.commands import completed
-from tests.real_arm.emulated import TIMEOUT, emulator
-from tests.waiting import until
+from tests.real_arm.emulated import TIMEOUT
 
 KATANA450 = (sys.executable, "-m", "katana450")
 
@@ -107,26 +100,6 @@ def test_missing_log_is_reported(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_server_drives_the_emulated_arm_and_keeps_a_log(tmp_path: Path) -> None:
-    log = tmp_path / "exchanges.log"
-    with emulator("--calibrated") as port:
-        arm = ("--arm", f"tcp://127.0.0.1:{port}", "--arm-log", str(log))
-        with AppServer((*APP, *arm)) as app, connect(app.url, "Test") as client:
-            assert measured(client).mode == "disconnected"
-            for act, mode in ((ArmAct.CONNECT, "uncalibrated"), (ArmAct.ENGAGE, "holding")):
-                client.ask(OperateArm(act=act, confirmed=True))
-                wait_for(client, mode)
-            client.clear_stop()
-            target = [angle - 0.1 * np.sign(angle) for angle in client.query(answers.State).q]
-            state = client.joints(target)
-            wait_for(client, "holding")
-            state = client.query(answers.State)
-            assert np.degrees(np.abs(np.array(state.q) - target).max()) < 0.2
-            assert measured(client).tracking_error < np.radians(1.0)
-    assert b" > 01 18 4b 48" in log.read_bytes(), "polynomials were sent"
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -143,16 +116,6 @@ def test_server_refuses_an_arm_that_it_cannot_drive(options: tuple[str, ...], wo
     done = katana450("serve", "--port", str(free_port()), "--no-log", "--no-record", *options)
     assert done.returncode != 0
     assert words in done.stderr
-
-
-def measured(client: Client) -> MeasuredArm:
-    arm = client.query(answers.State).arm
-    assert arm is not None
-    return arm
-
-
-def wait_for(client: Client, mode: str) -> None:
-    until(lambda: measured(client).mode == mode, TIMEOUT)
 
 
 @pytest.mark.parametrize(

@@ -86,41 +86,6 @@ def inwards(loop: SmallLoop, size: float = 0.3, fingers: float = 0.0) -> None:
     loop.setpoint = lambda t: start + away(t) + closing * max(t - start_time, 0.0)
 
 
-def test_collision_is_reported_and_unblocked(wire: Wire) -> None:
-    with emulated() as (loop, server):
-        with server.lock:
-            server.arm.obstruct(1, 29500)
-        loop.engage()
-        inwards(loop)
-        loop.wait(ArmMode.COLLIDED, 4.0)
-        assert "A collision stopped ax" in loop.report.note
-        loop.stop()
-        with server.lock:
-            server.arm.release(1)
-        loop.act(ArmAct.UNBLOCK, ArmMode.HOLDING)
-        count = len(wire.motions())
-        loop.clear_stop()
-        time.sleep(0.3)
-        assert len(wire.motions()) == count
-
-
-def test_power_cycle_ends_in_a_state_where_nothing_moves(wire: Wire) -> None:
-    with emulated() as (loop, server):
-        loop.engage()
-        inwards(loop)
-        loop.wait(ArmMode.MOVING)
-        with server.lock:
-            server.arm.switch_off()
-        loop.wait(ArmMode.LOST, 6.0)
-        count = len(wire.motions())
-        time.sleep(0.2)
-        with server.lock:
-            server.arm.switch_on()
-        loop.wait(ArmMode.UNCALIBRATED, 5.0)
-        time.sleep(0.3)
-        assert len(wire.motions()) == count
-
-
 def cut(server: EmulatorServer, loop: SmallLoop, *, hangs: bool) -> float:
     """Reset the connection, or let the arm hang, and wait until the loss is reported.
 
