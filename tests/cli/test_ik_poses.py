@@ -14,7 +14,11 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.cli.lines import ask
-from tests.cli.test_lines import random_postures
+
+
+def random_postures(arm: MountedArm, count: int) -> FloatArray:
+    chain = arm.chain
+    return np.random.default_rng(450).uniform(chain.lower, chain.upper, (count, chain.n))
 
 
 def forms(T: FloatArray, decimals: int = 17) -> list[dict[str, Any]]:
