@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote_to_bytes
 
@@ -14,8 +12,6 @@ from katana450.cli.main import _parser, main
 from katana450.extensions import phone
 from katana450.extensions.phone import LINK_REQUIRED, LOOPBACK_ONLY, phone_address
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address
-from tests.browser.server import APP, AppServer
-from tests.gateway.client import ask
 
 LOOPBACK = Address(LOOPBACK_NAMES, any_address=False, secure=False)
 OPEN = Address(LOOPBACK_NAMES | {"robot"}, any_address=True, secure=False)
@@ -73,21 +69,3 @@ def test_server_on_loopback_says_how_to_let_a_phone_in(
     assert (options.host, options.port, str(options.access)) == ("0.0.0.0", 8080, "access.json")
     monkeypatch.setattr(phone, "own_address", lambda: None)
     assert phone_address(OPEN, "localhost:8080", 8080, requires_link=False).url is None
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer((*APP, "--host", "0.0.0.0", "--insecure")) as server:
-        yield server
-
-
-@pytest.mark.long
-def test_server_tells_its_address(server: AppServer) -> None:
-    url = f"{server.url}/api/v1/phone"
-    code, _, body = ask(url, Host=f"10.0.0.7:{server.port}")
-    assert code == 200
-    answer = json.loads(body)
-    assert answer["url"] == f"http://10.0.0.7:{server.port}"
-    assert "Everybody who opens" in answer["note"]
-    codes = {ask(url)[0] for _ in range(20)}
-    assert codes == {200, 429}

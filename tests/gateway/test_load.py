@@ -113,6 +113,10 @@ def test_http_questions_take_from_the_same_budget(local: VirtualServer) -> None:
     assert local.ask("/api/v1/stop", data=b"")[0] == 204
 
 
+def test_codes_for_phones_are_limited(local: VirtualServer) -> None:
+    assert {local.ask("/api/v1/phone")[0] for _ in range(20)} == {200, 429}
+
+
 def test_silent_tcp_connections_do_not_block_programs(server: AppServer) -> None:
     port = Lines.port(server)
     with silent(port, 64):
