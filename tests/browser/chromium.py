@@ -12,7 +12,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 from playwright.sync_api import Browser, Error, Playwright, sync_playwright
 
@@ -72,32 +71,20 @@ class BrowserError(RuntimeError):
     """Raised without a usable browser; the message names what to install or to set."""
 
 
-class Installer(NamedTuple):
-    """Commands that install a browser, and whether they must be run by root."""
-
-    commands: tuple[tuple[str, ...], ...]
-    needs_root: bool
-
-
-INSTALLERS = {
-    "apt-get": Installer(
-        (
-            ("apt-get", "update"),
-            (
-                *("apt-get", "install", "--yes", "--no-install-recommends"),
-                *("chromium", "libgl1-mesa-dri", "libegl1"),
-            ),
-        ),
-        needs_root=True,
+INSTALLATION = (
+    ("apt-get", "update"),
+    (
+        *("apt-get", "install", "--yes", "--no-install-recommends"),
+        *("chromium", "libgl1-mesa-dri", "libegl1"),
     ),
-    "dnf": Installer(
-        (("dnf", "install", "-y", "chromium", "mesa-dri-drivers", "mesa-libEGL"),), needs_root=True
-    ),
-    "pacman": Installer(
-        (("pacman", "-Sy", "--needed", "--noconfirm", "chromium", "mesa"),), needs_root=True
-    ),
-    "brew": Installer((("brew", "install", "--cask", "google-chrome"),), needs_root=False),
-}
+)
+"""Commands that install a browser on Debian and Ubuntu."""
+
+REMEDY = (
+    "Install Chromium or Chrome, for example: "
+    f"{' && '.join('sudo ' + ' '.join(command) for command in INSTALLATION)}\n"
+    f"Or set {ENVIRONMENT_VARIABLE} to the path of one."
+)
 
 
 def find() -> Path | None:
@@ -143,38 +130,25 @@ def ensure() -> Path:
         _install()
         path = find()
     if path is None:
-        raise BrowserError(f"the installation provided none of {', '.join(NAMES)}. {_remedy()}")
+        raise BrowserError(f"the installation provided none of {', '.join(NAMES)}. {REMEDY}")
     version(path)
     return path
 
 
 def _install() -> None:
-    manager = next((name for name in INSTALLERS if shutil.which(name)), None)
-    if manager is None:
-        raise BrowserError(f"no Chromium and no package manager were found. {_remedy()}")
-    installer = INSTALLERS[manager]
+    if not shutil.which("apt-get"):
+        raise BrowserError(f"no Chromium was found. {REMEDY}")
     prefix: tuple[str, ...] = ()
-    if installer.needs_root and os.geteuid() != 0:
+    if os.geteuid() != 0:
         prefix = ("sudo", "--non-interactive")
         if not shutil.which("sudo") or subprocess.run([*prefix, "true"], check=False).returncode:
-            raise BrowserError(f"no Chromium was found, and root must install one. {_remedy()}")
-    for command in installer.commands:
+            raise BrowserError(f"no Chromium was found, and root must install one. {REMEDY}")
+    for command in INSTALLATION:
         print("Running:", *prefix, *command, flush=True)
         environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
         status = subprocess.run([*prefix, *command], env=environment, check=False).returncode
         if status:
-            raise BrowserError(f"`{' '.join(command)}` failed with status {status}. {_remedy()}")
-
-
-def _remedy() -> str:
-    manager = next((name for name in INSTALLERS if shutil.which(name)), "apt-get")
-    installer = INSTALLERS[manager]
-    sudo = "sudo " if installer.needs_root else ""
-    commands = " && ".join(sudo + " ".join(command) for command in installer.commands)
-    return (
-        f"Install Chromium or Chrome, for example: {commands}\n"
-        f"Or set {ENVIRONMENT_VARIABLE} to the path of one."
-    )
+            raise BrowserError(f"`{' '.join(command)}` failed with status {status}. {REMEDY}")
 
 
 @contextmanager
@@ -213,7 +187,7 @@ def _launch(playwright: Playwright, path: Path) -> Browser:
             return browser
         failures.append(f"{renderer}: no WebGL 2")
         browser.close()
-    raise BrowserError(f"{path} cannot draw WebGL 2 ({'; '.join(failures)}). {_remedy()}")
+    raise BrowserError(f"{path} cannot draw WebGL 2 ({'; '.join(failures)}). {REMEDY}")
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ import pytest
 from katana450.extension import Extension, extensions, load
 from katana450.server.api.fields import ROOT as ROOT_PATH
 from tests.browser.server import AppServer
-from tests.commands import completed, modules_after
+from tests.commands import completed
 from tests.extensions.environments import distribution
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -125,8 +125,3 @@ def test_broken_extension_of_another_distribution_is_reported_and_left_out(
     assert answered.startswith("0 ")
     assert '"T": [[1.0, ' in answered
     assert message in answered
-
-
-def test_reading_options_loads_nothing_heavy() -> None:
-    loaded = modules_after("from katana450.cli.main import _parser; _parser()")
-    assert not loaded & {"numpy", "viser", "yaml", "trimesh", "asyncio", "importlib.metadata"}

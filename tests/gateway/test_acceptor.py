@@ -38,7 +38,7 @@ from katana450.server.web.limits import ConnectionLimit
 from katana450.server.web.listen import WANTED_DESCRIPTORS, listen
 from katana450.server.web.program_socket import ProgramChannel
 from katana450.settings import Settings
-from tests.commands import completed, modules_after
+from tests.commands import completed
 from tests.gateway.client import HOUR, Control, ask, enter, page_name, websocket
 from tests.gateway.virtual import VirtualServer
 
@@ -430,8 +430,3 @@ async def test_socket_of_the_page_opens_with_the_scene_and_its_requests_wait(
 def test_requests_for_other_hosts_are_refused_at_once(web: WebServer) -> None:
     for path in ("/", "/health"):
         assert ask(f"{url_of(web)}{path}", Host="elsewhere.example")[0] == 403
-
-
-def test_pages_need_neither_numpy_nor_viser() -> None:
-    loaded = modules_after("import katana450.assembly.web_server")
-    assert not loaded & {"numpy", "viser", "trimesh"}

@@ -1,4 +1,4 @@
-"""Test that a program comes to rest when its owner falls silent on an open connection."""
+"""Test that a program comes to rest when its owner falls silent, unless it runs unattended."""
 
 from __future__ import annotations
 
@@ -6,49 +6,19 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+from katana450.client import connect
 from katana450.extensions.programs.serve_options import OWNER_SILENCE
+from katana450.server.api import answers
 from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer
-from tests.gateway.client import ask, state_of
-from tests.gateway.lines import post
 from tests.gateway.test_programs import WAVE
 from tests.gateway.virtual import VirtualServer
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer(ATTENTIVE_APP) as server:
-        yield server
-
-
-def wait(server: AppServer, status: str, seconds: float = 30.0) -> dict[str, Any]:
-    """Wait until the program is ``status`` and, if it ended, the arm is at rest."""
-    end = time.monotonic() + seconds
-    while True:
-        state = state_of(server)
-        program = state.get("program") or {"status": None}
-        ended = status in ("running", "ready") or not state["moving"]
-        if program["status"] == status and ended:
-            return state
-        assert time.monotonic() < end, program
-        time.sleep(0.02)
-
-
-def clear_stop(server: AppServer) -> None:
-    end = time.monotonic() + 10.0
-    while (state := state_of(server))["stopped"] is not None and not state["clearable"]:
-        assert time.monotonic() < end
-        time.sleep(0.02)
-    assert post(server, do="clear_stop")[0] == 200
-    # The lease stays free for the owner of a program that was stopped.
-    if state_of(server)["holder"] is not None:
-        assert post(server, do="release_lease")[0] == 200
+from tests.waiting import state_when
 
 
 def test_silent_owner_on_an_open_socket_ends_its_program(local: VirtualServer) -> None:
@@ -70,40 +40,34 @@ def test_silent_owner_on_an_open_socket_ends_its_program(local: VirtualServer) -
     assert 0.05 < state.q[0] < np.deg2rad(100) - 0.05
 
 
+def is_in(status: str, state: answers.State) -> bool:
+    return state.program is not None and state.program.status == status
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
-def test_unattended_program_outlives_its_terminal(
-    server: AppServer, tmp_path: Path, end: signal.Signals
-) -> None:
+def test_unattended_program_outlives_its_terminal(tmp_path: Path) -> None:
     script = tmp_path / "wave.yaml"
     script.write_text(WAVE)
-    command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
-    with subprocess.Popen(
-        [*command, "--unattended"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-    ) as owner:
-        try:
-            wait(server, "running")
+    with AppServer(ATTENTIVE_APP) as server, connect(server.url, "Watcher") as watcher:
+        command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
+        with subprocess.Popen(
+            [*command, "--unattended"], stderr=subprocess.PIPE, text=True, cwd=ROOT
+        ) as owner:
+            state_when(watcher, partial(is_in, "running"))
             time.sleep(0.2)
-            owner.send_signal(end)
+            owner.send_signal(signal.SIGINT)
             errors = owner.communicate(timeout=20)[1]
-        finally:
-            owner.kill()
-    if end is signal.SIGINT:
         assert owner.returncode == 0
         assert "the program runs on, unattended" in errors
-    time.sleep(2.0 * OWNER_SILENCE)
-    state = wait(server, "running", 1.0)
-    assert state["moving"]
-    assert state["program"]["unattended"]
-    assert state["program"]["by"].startswith("Terminal")
-    assert state["program"]["began"].endswith("+00:00")
-    assert ask(f"{server.url}/api/v1/stop", data=b"", Origin=server.url)[0] == 204
-    state = wait(server, "stopped")
-    assert not state["program"]["unattended"]
-    assert state["holder"] is None
-    clear_stop(server)
-    assert state_of(server)["stopped"] is None
+        time.sleep(2.0 * OWNER_SILENCE)
+        state = watcher.query(answers.State)
+        assert state.moving
+        assert state.program is not None
+        assert (state.program.status, state.program.unattended) == ("running", True)
+        assert state.program.by.startswith("Terminal")
+        assert str(state.program.began).endswith("+00:00")
+        watcher.stop()
+        state = state_when(watcher, partial(is_in, "stopped"))
+        assert state.program is not None
+        assert (state.program.unattended, state.holder) == (False, None)
+        watcher.clear_stop()

@@ -3,51 +3,41 @@
 from __future__ import annotations
 
 import ast
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import katana450
+from tests.commands import modules_after
 
 HEAVY = ("numpy", "viser", "mujoco", "trimesh", "yourdfpy", "matplotlib", "ruckig", "msgspec")
 
 
-def modules_after(statement: str) -> set[str]:
-    """Return the names of all modules that a fresh process has loaded after ``statement``."""
-    done = subprocess.run(
-        [sys.executable, "-c", f"{statement}; import sys; print(*sys.modules)"],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    )
-    return set(done.stdout.split())
+SERVERS = {"starlette", "uvicorn", "websockets", "viser"}
+
+LIGHT = {
+    "import katana450": {*HEAVY},
+    "import katana450; dir(katana450); katana450.InputError": {*HEAVY},
+    "import katana450; katana450.load().fk([0.0] * 5)": {*SERVERS, "matplotlib"},
+    "import katana450.cli.serve": {*SERVERS, "numpy"},
+    "import katana450.assembly.stop_process": {*SERVERS, "numpy"},
+    "import katana450.assembly.web_server": {"numpy", "viser", "trimesh"},
+    "from katana450.cli.main import _parser; _parser()": {
+        *("numpy", "viser", "yaml", "trimesh", "asyncio", "importlib.metadata")
+    },
+}
+"""Statements, and the modules that they do not load."""
 
 
-def test_import_loads_no_library() -> None:
-    loaded = modules_after("import katana450")
+@pytest.mark.parametrize("statement", LIGHT)
+def test_statement_loads_nothing_heavy(statement: str) -> None:
+    loaded = modules_after(statement)
     assert "katana450" in loaded
-    assert not loaded.intersection(HEAVY)
-    assert {name for name in loaded if name.startswith("katana450.")} == {"katana450.lazy_names"}
-
-
-def test_errors_and_names_load_no_library() -> None:
-    loaded = modules_after("import katana450; dir(katana450); katana450.InputError")
-    assert not loaded.intersection(HEAVY)
-
-
-def test_kinematics_load_neither_viewer_nor_plots() -> None:
-    loaded = modules_after("import katana450; katana450.load().fk([0.0] * 5)")
-    assert "numpy" in loaded
-    assert not loaded.intersection({"viser", "matplotlib", "starlette", "websockets"})
-
-
-@pytest.mark.parametrize("name", ["cli.serve", "assembly.stop_process"])
-def test_supervisor_and_process_of_stop_start_light(name: str) -> None:
-    loaded = modules_after(f"import katana450.{name}")
-    assert not loaded.intersection({"numpy", "viser", "starlette", "uvicorn"})
+    if statement == "import katana450":
+        assert {name for name in loaded if name.startswith("katana450.")} == {
+            "katana450.lazy_names"
+        }
+    assert not loaded & LIGHT[statement]
 
 
 @pytest.mark.parametrize("name", katana450.__all__)
