@@ -120,9 +120,7 @@ async def test_sender_of_repeated_bad_messages_is_disconnected(server: AppServer
         assert await good.listen(BRIEF) == []
 
 
-async def test_message_that_no_page_sends_changes_nothing_and_the_arm_obeys_a_valid_one(
-    server: AppServer,
-) -> None:
+async def test_message_that_no_page_sends_changes_nothing(server: AppServer) -> None:
     async with opened(server.url) as (bad, _), opened(server.url) as (good, control):
         await control.say("take")
         await control.wait(mine=True)
