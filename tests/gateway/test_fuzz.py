@@ -209,7 +209,7 @@ async def storm(server: AppServer) -> list[int]:
     return await asyncio.gather(*(pour_in(MESSAGES // 4, *kind) for kind in kinds))
 
 
-kept = attrgetter("q", "goal", "gripper", "tool", "speed", "holder", "stopped")
+driver_values = attrgetter("q", "goal", "gripper", "tool", "speed", "holder", "stopped")
 """Returns the values of a state that only the driver may change."""
 
 
@@ -221,7 +221,7 @@ def test_broken_messages_cause_no_crash_and_no_motion(server: AppServer) -> None
         counts = asyncio.run(storm(server))
         print(f"{MESSAGES} messages; lines it took: {counts}")
         after = arm.query(answers.State)
-        assert kept(after) == kept(before)
+        assert driver_values(after) == driver_values(before)
         assert not after.moving
         assert arm.query(answers.Objects).objects == objects
         # The driver keeps the lease and can drive.
