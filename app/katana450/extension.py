@@ -74,28 +74,6 @@ class TickSender(Protocol):
         """End after what waits, or after a short time."""
 
 
-class ServerLog:
-    """The event log of a server, seen from the process that starts the others. This one keeps none.
-
-    No method waits for a disk, except ``close``.
-    """
-
-    @property
-    def description(self) -> tuple[str, ...]:
-        """Lines for the terminal on where the log is."""
-        return ()
-
-    def attach(self, pipe: Connection) -> None:
-        """Write the records that another process sends by ``pipe``."""
-        pipe.close()
-
-    def restart(self, process: str, status: int | None) -> None:
-        """Record that ``process`` ended with ``status``, and is started again."""
-
-    def close(self, *, requested: bool) -> None:
-        """Record the end of the server, and write what waits. ``requested``: by a signal."""
-
-
 @dataclass(frozen=True)
 class ServerFacts:
     """Description of a server for each process of it, used each time the process is started.
@@ -144,8 +122,7 @@ class Extension:
     """One extension of the app: where its parts are. Each part is imported when it is used.
 
     The process of the arm calls ``initial_scene``, ``driver`` and ``tick_sender``, and that which
-    starts the others calls ``server_log`` and ``process``. The process of the view calls
-    the rest.
+    starts the others calls ``process``. The process of the view calls the rest.
 
     Attributes:
         name: Its name in messages.
@@ -176,10 +153,6 @@ class Extension:
         step: A script step, a class derived from ``Step``. Other steps of its module are added too.
         folder: Adds controls to a tab of the panel, given a FolderContext, and returns them, or
             None. Called also for a robot without an arm. Raises KatanaError.
-        server_log: Returns the event log of the server, given the options and the port, or None. Of
-            the first extension that has it.
-        send_records: Sends records of the notes of a recorder by a pipe to that event log, and
-            returns the function that ends this.
         process: Returns a further process of the server, given the options and a ServerFacts, or
             None.
         tick_sender: Returns the TickSender to that process according to the options, or None.
@@ -204,8 +177,6 @@ class Extension:
     handler: Target | None = None
     step: Target | None = None
     folder: Target | None = None
-    server_log: Target | None = None
-    send_records: Target | None = None
     process: Target | None = None
     tick_sender: Target | None = None
     driver: Target | None = None

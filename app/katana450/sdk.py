@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from katana450.extension import Extension as Extension
     from katana450.extension import ExtraProcess as ExtraProcess
     from katana450.extension import ServerFacts as ServerFacts
-    from katana450.extension import ServerLog as ServerLog
     from katana450.extension import TickSender as TickSender
     from katana450.extensions.programs.building.plan_state import PlanState as PlanState
     from katana450.extensions.programs.building.step import Step as Step

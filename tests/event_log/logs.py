@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from katana450.extensions.event_log.disk_log import DiskLog
-from katana450.extensions.event_log.log_files import MAX_FILE_BYTES, MAX_FILES, lines_of, log_files
-from katana450.extensions.event_log.records import Record, record
+from katana450.assembly.event_log.disk_log import DiskLog
+from katana450.assembly.event_log.log_files import MAX_FILE_BYTES, MAX_FILES, lines_of, log_files
+from katana450.assembly.event_log.records import Record, record
 
 CLOSING = 20.0
 """[s] Timeout of the writer's end."""

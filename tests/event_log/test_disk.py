@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from katana450.assembly.event_log.disk_log import DiskLog
+from katana450.assembly.event_log.log_files import PRESENT, LogFile
+from katana450.assembly.event_log.records import Record, record
 from katana450.client import connect
-from katana450.extensions.event_log.disk_log import DiskLog
-from katana450.extensions.event_log.log_files import PRESENT, LogFile
-from katana450.extensions.event_log.records import Record, record
 from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
 from tests.event_log.logs import CLOSING, numbered, records

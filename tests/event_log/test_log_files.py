@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from katana450.assembly.event_log.disk_log import DiskLog
+from katana450.assembly.event_log.log_files import PRESENT, log_files
+from katana450.assembly.event_log.records import MAX_LINE_BYTES, record
 from katana450.cli.main import main
-from katana450.extensions.event_log.disk_log import DiskLog
-from katana450.extensions.event_log.log_files import PRESENT, log_files
-from katana450.extensions.event_log.records import MAX_LINE_BYTES, record
 from tests.event_log.logs import newest, numbered, records, write
 
 BREAKS = ["\n", "\r", "\v", "\f", "\x00", "\x1b[2K\x1b[31m", "\x85", "\u2028", "\u2029", "\u202e"]

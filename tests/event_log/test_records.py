@@ -16,21 +16,21 @@ from katana450.arm.control.commands.act import Command
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import Finding, Outcome, Reason, Verdict
-from katana450.client import connect
-from katana450.extensions.event_log.record_content import content_of
-from katana450.extensions.event_log.record_maker import (
+from katana450.assembly.event_log.record_content import content_of
+from katana450.assembly.event_log.record_maker import (
     LIMITS,
     STREAM_GAP,
     RecordMaker,
     RecordSender,
 )
-from katana450.extensions.event_log.records import (
+from katana450.assembly.event_log.records import (
     MAX_LINE_BYTES,
     MAX_TEXT,
     Record,
     encoded,
     record,
 )
+from katana450.client import connect
 from katana450.server.api import requests
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity

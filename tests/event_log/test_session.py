@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from katana450.arm.control.lease import Role
+from katana450.assembly.event_log.records import Record
 from katana450.cli.main import main
 from katana450.client import aconnect
 from katana450.client.asynchronous import AsyncClient
-from katana450.extensions.event_log.records import Record
 from katana450.server.api import answers
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.web.access_links import AccessFile

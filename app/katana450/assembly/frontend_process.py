@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import gc
 import socket
-from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, NamedTuple
 
 from katana450.assembly.arm_process import ARM
 from katana450.assembly.supervised import READY, SupervisorPipe
-from katana450.extension import ServerFacts, results
+from katana450.extension import ServerFacts
 from katana450.platform_support import reset_priority
 
 if TYPE_CHECKING:
@@ -83,16 +82,19 @@ def _run(
     gateway.hub.supervisor_problem = lambda: supervisor.problem
     gateway.hub.replace_robot = supervisor.replace_robot
     supervisor.notify = gateway.announce
-    senders: list[Callable[[], None]] = []
+    sender: RecordSender | None = None
     try:
+        from katana450.assembly.event_log.record_maker import RecordSender
         from katana450.assembly.frontend import Frontend
 
         frontend = Frontend(gateway, config, meshes, supervisor.ended)
         gateway.show()
         # Browsers draw the scene meanwhile.
-        senders = [*results("send_records", config.options, web.recorder, records)]
-        # Without a reader, notes would only take memory.
-        web.recorder.enabled = bool(senders)
+        if config.options.no_log:
+            # Without a reader, notes would only take memory.
+            web.recorder.enabled = False
+        else:
+            sender = RecordSender(web.recorder, records)
         gateway.start(config.options)
         supervisor.prove(lambda: gateway.hub.held_up < HANG_SECONDS)
         frontend.start()
@@ -107,6 +109,6 @@ def _run(
         frontend.stop()
     finally:
         web.stop()
-        for close in senders:
-            close()
+        if sender is not None:
+            sender.close()
         close_server(gateway.viser)

@@ -268,18 +268,10 @@ class Child:
 class Supervisor:
     """Keeps all processes running."""
 
-    def __init__(
-        self,
-        specs: Sequence[ChildSpec],
-        stopping: threading.Event,
-        on_restart: Callable[[str, int | None], None] = lambda _name, _status: None,
-    ) -> None:
-        """Create the supervisor.
-
-        ``stopping``: ends ``wait_for`` and ``run`` once it is set. ``on_restart``: called with the
-        name and the exit status of each process that is started again.
-        """
-        self._on_restart = on_restart
+    def __init__(self, specs: Sequence[ChildSpec], stopping: threading.Event) -> None:
+        """Create the supervisor. ``stopping``: ends ``wait_for`` and ``run`` once it is set."""
+        self.on_restart: Callable[[str, int | None], None] = lambda _name, _status: None
+        """Called with the name and the exit status of each process that is started again."""
         self._children = {spec.name: Child(spec) for spec in specs}
         self._stopping = stopping
         self._turned = self._notice_at = time.monotonic()
@@ -377,7 +369,7 @@ class Supervisor:
             when = f" in {delay:g} s" if delay else ""
             text = f"{child.spec.title} ended with status {code} and is started again{when}."
             log.error("%s%s", text, error)
-            self._on_restart(child.spec.name, code)
+            self.on_restart(child.spec.name, code)
             self._announce(child, text)
             if not delay:
                 self._start(child)

@@ -21,6 +21,7 @@ from typing import Any
 
 from katana450.arm.runtime.pipes.arm_listener import ArmAddress
 from katana450.assembly.arm_process import ARM, run_arm
+from katana450.assembly.event_log.disk_log import DiskLog, default_folder
 from katana450.assembly.frontend_process import OPEN, Sockets, run_frontend
 from katana450.assembly.log_output import say, start_log
 from katana450.assembly.stop_process import run_stop
@@ -28,7 +29,7 @@ from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.cli.open_page import show_page
 from katana450.errors import ConfigurationError, KatanaError
-from katana450.extension import ExtraProcess, ServerFacts, ServerLog, results
+from katana450.extension import ExtraProcess, ServerFacts, results
 from katana450.platform_support import (
     claim_file,
     create_file,
@@ -84,7 +85,7 @@ def serve(options: Namespace) -> int:
     stopping_socket = listen_beside(listening, settings.host, settings.stop_port)
     port, stop_port = listening.getsockname()[1], stopping_socket.getsockname()[1]
     settings = replace(settings, stop_port=stop_port)
-    event_log: ServerLog = next(results("server_log", options, port), ServerLog())
+    event_log = None if options.no_log else DiskLog(options.log or default_folder(port), port)
     server = _Server(settings, Sockets(listening, lines), stopping_socket, event_log, stopping)
     again, before = False, None
     try:
@@ -109,7 +110,8 @@ def serve(options: Namespace) -> int:
     finally:
         listening.close()
         stopping_socket.close()
-        event_log.close(requested=stopping.is_set())
+        if event_log is not None:
+            event_log.close(requested=stopping.is_set())
 
 
 @dataclass(frozen=True)
@@ -121,14 +123,14 @@ class _Server:
         sockets: the sockets of the page and of programs, held by this process, so that the ports
             stay taken.
         stopping_socket: the socket for STOP.
-        event_log: the event log.
+        event_log: the event log; None without one.
         stopping: set when the server must end.
     """
 
     settings: Settings
     sockets: Sockets
     stopping_socket: socket.socket
-    event_log: ServerLog
+    event_log: DiskLog | None
     stopping: threading.Event
 
     def run(self, options: Namespace, *, again: bool) -> Path | None:
@@ -163,7 +165,9 @@ class _Server:
                 for process in extra
             ),
         )
-        supervisor = Supervisor(specs, stopping, event_log.restart)
+        supervisor = Supervisor(specs, stopping)
+        if event_log is not None:
+            supervisor.on_restart = event_log.restart
         try:
             supervisor.start()
             supervisor.wait_for(ARM, READY)
@@ -181,8 +185,10 @@ class _Server:
                 lines = self.sockets.lines
                 if lines is not None:
                     say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
-                for line in (*event_log.description, *(added.description for added in extra)):
-                    say(line)
+                if event_log is not None:
+                    say(f"Event log: {event_log.folder}")
+                for added in extra:
+                    say(added.description)
                 say(
                     f"katana450 is ready: {url} (STOP also on port {settings.stop_port}; Ctrl-C "
                     "stops)"
@@ -200,7 +206,7 @@ class _Server:
 class _FrontendWork:
     """Returns the function of each front end that is started, with a new pipe to the event log."""
 
-    def __init__(self, facts: ServerFacts, sockets: Sockets, event_log: ServerLog) -> None:
+    def __init__(self, facts: ServerFacts, sockets: Sockets, event_log: DiskLog | None) -> None:
         self._facts, self._sockets = facts, sockets
         self._event_log = event_log
         self._sender: Connection | None = None
@@ -210,7 +216,10 @@ class _FrontendWork:
         self.close()
         ends: Any = multiprocessing.get_context("spawn").Pipe()
         receiver, self._sender = ends
-        self._event_log.attach(receiver)
+        if self._event_log is None:
+            receiver.close()
+        else:
+            self._event_log.attach(receiver)
         return partial(run_frontend, self._facts, self._sockets, self._sender)
 
     def close(self) -> None:

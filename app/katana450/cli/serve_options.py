@@ -73,6 +73,14 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         help="TCP port that serves STOP alone, from a process of its own (default: the port after "
         "--port, or a free one)",
     )
+    logged = parser.add_mutually_exclusive_group()
+    logged.add_argument(
+        "--log",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of the event log (default: one for each port, named at the start)",
+    )
+    logged.add_argument("--no-log", action="store_true", help="write no event log")
     parser.add_argument("--no-browser", action="store_true", help="do not open the page by itself")
     for add_options in provided("serve_options"):
         add_options(parser)

@@ -21,20 +21,6 @@ EXTENSIONS = (
     ),
     Extension("api_description", routes=f"{HERE}.api_description:description_routes"),
     Extension(
-        "event_log",
-        (
-            CliCommand(
-                "log",
-                "show the event log of a server",
-                f"{HERE}.event_log.log_command:add_log_options",
-                f"{HERE}.event_log.log_command:log",
-            ),
-        ),
-        serve_options=f"{HERE}.event_log.log_command:add_serve_options",
-        server_log=f"{HERE}.event_log.disk_log:disk_log",
-        send_records=f"{HERE}.event_log.record_maker:send_records",
-    ),
-    Extension(
         "programs",
         serve_options=f"{HERE}.programs.serve_options:add_serve_options",
         view_layer=f"{HERE}.programs.server.traces:TracesLayer",

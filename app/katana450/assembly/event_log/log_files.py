@@ -9,8 +9,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from katana450.assembly.event_log.records import Record, decoded, encoded
 from katana450.errors import InputError
-from katana450.extensions.event_log.records import Record, decoded, encoded
 from katana450.platform_support import claim_file, open_bytes
 
 PRESENT = "events.jsonl"

@@ -11,9 +11,7 @@ import logging
 import math
 import threading
 import time
-from argparse import Namespace
 from collections import Counter, OrderedDict
-from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from queue import Empty
@@ -27,8 +25,8 @@ from katana450.arm.control.state.event_log import LogEntry
 from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import Outcome, Verdict
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.extensions.event_log.record_content import content_of
-from katana450.extensions.event_log.records import Record, record, text, utc
+from katana450.assembly.event_log.record_content import content_of
+from katana450.assembly.event_log.records import Record, record, text, utc
 from katana450.server.service.recorder import Note, Recorder
 from katana450.server.web.limits import SenderBuckets, TokenBucket
 
@@ -292,16 +290,6 @@ def _label(record: Record) -> str:
     if isinstance(what, dict):
         name = what.get("command") or what.get("request") or what.get("lease") or ""
     return f"{record['who']['name']}: {record['kind']} {name}".strip()
-
-
-def send_records(
-    options: Namespace, recorder: Recorder, pipe: Connection
-) -> Callable[[], None] | None:
-    """Send records of the notes of ``recorder`` by ``pipe``; return the function that ends this.
-
-    None if the options choose no event log.
-    """
-    return None if options.no_log else RecordSender(recorder, pipe).close
 
 
 class RecordSender:

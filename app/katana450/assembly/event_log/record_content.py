@@ -12,7 +12,7 @@ import numpy as np
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Act, content_names
-from katana450.extensions.event_log.records import text
+from katana450.assembly.event_log.records import text
 from katana450.maths.planning.plan import Plan
 
 MAX_ITEMS = 16

@@ -10,7 +10,6 @@ import logging
 import os
 import threading
 import time
-from argparse import Namespace
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -19,9 +18,8 @@ from typing import Any
 
 from katana450.arm.runtime.pipes.guarded_pipe import GuardedPipe
 from katana450.arm.runtime.readiness import writable
-from katana450.extension import ServerLog
-from katana450.extensions.event_log.log_files import MAX_FILE_BYTES, MAX_FILES, LogFile
-from katana450.extensions.event_log.records import Record, record
+from katana450.assembly.event_log.log_files import MAX_FILE_BYTES, MAX_FILES, LogFile
+from katana450.assembly.event_log.records import Record, record
 from katana450.platform_support import state_folder
 
 log = logging.getLogger(__name__)
@@ -39,7 +37,7 @@ CLOSE_TIMEOUT = 2.0
 """[s] Time in which a slow disk may take the last records."""
 
 
-class DiskLog(ServerLog):
+class DiskLog:
     """The event log of this server in a folder, which is created when needed."""
 
     def __init__(
@@ -63,9 +61,9 @@ class DiskLog(ServerLog):
         self._note("start", {"port": port, "pid": os.getpid()})
 
     @property
-    def description(self) -> tuple[str, ...]:
-        """The folder, as a line for the terminal."""
-        return (f"Event log: {self._file.folder}",)
+    def folder(self) -> Path:
+        """The folder."""
+        return self._file.folder
 
     def put(self, content: Record) -> None:
         """Write ``content`` soon; drop and count it if too many records wait."""
@@ -188,8 +186,3 @@ def _tell(pipe: Connection, problem: str) -> None:
 def default_folder(port: int) -> Path:
     """Return the folder of the event log of the server on ``port``."""
     return state_folder() / "katana450" / "events" / f"port-{port}"
-
-
-def disk_log(options: Namespace, port: int) -> DiskLog | None:
-    """Return the event log of the server on ``port``; None if the options choose none."""
-    return None if options.no_log else DiskLog(options.log or default_folder(port), port)

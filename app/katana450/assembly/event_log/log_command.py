@@ -7,9 +7,9 @@ import json
 import sys
 from pathlib import Path
 
+from katana450.assembly.event_log.records import Record
 from katana450.assembly.log_output import printable
 from katana450.errors import InputError
-from katana450.extensions.event_log.records import Record
 from katana450.settings import Settings
 
 
@@ -27,22 +27,10 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
     show.add_argument("--port", type=int, default=Settings.port, help=argparse.SUPPRESS)
 
 
-def add_serve_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``katana450 serve`` to ``parser``."""
-    logged = parser.add_mutually_exclusive_group()
-    logged.add_argument(
-        "--log",
-        type=Path,
-        metavar="FOLDER",
-        help="folder of the event log (default: one for each port, named at the start)",
-    )
-    logged.add_argument("--no-log", action="store_true", help="write no event log")
-
-
 def log(options: argparse.Namespace) -> int:
     """Run ``katana450 log`` and return the exit status: 1 if a line is not a record."""
-    from katana450.extensions.event_log.disk_log import default_folder
-    from katana450.extensions.event_log.log_files import lines_of
+    from katana450.assembly.event_log.disk_log import default_folder
+    from katana450.assembly.event_log.log_files import lines_of
 
     folder = options.folder or default_folder(options.port)
     if options.folder is None and not folder.is_dir() and folder.parent.is_dir():
