@@ -21,8 +21,6 @@ from katana450.arm.robot.surfaces import shapes_of
 from katana450.assembly import page_files
 from katana450.disk_cache import kept
 from katana450.extensions.bodies.pieces import pieces
-from katana450.extensions.conduit.rings import Floats, poses
-from katana450.extensions.conduit.stretches import stretches_of
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.server.view.scene import surface
@@ -253,7 +251,6 @@ def test_changed_file_is_read_again(tmp_path: Path) -> None:
 def test_every_kind_of_value_is_found_again(folder: Path) -> None:
     robot = load()
     visual = next(shape for link in robot.links for shape in link.visuals if shape.glb is not None)
-    stretch = stretches_of(robot)[0]
     for read in (
         load,
         partial(world_of, load()),
@@ -261,7 +258,6 @@ def test_every_kind_of_value_is_found_again(folder: Path) -> None:
         partial(shapes_of, visual),
         partial(surface, visual),
         partial(visual.kept, lambda: _merged(visual), Drawn),
-        partial(kept, lambda: poses(stretch, 9), Floats),
         page_files.load,
         viser_page.load,
     ):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,9 +12,7 @@ import viser
 
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
-from katana450.disk_cache import kept
 from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
-from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.layer import LayerContext, ViewLayer
 from katana450.server.view.scene import Colour
@@ -43,17 +40,13 @@ ANGLE_WORTH_SENDING = 2e-3
 
 
 class _StretchNode:
-    """One stretch in the scene, with the poses of its rings at a series of angles."""
+    """One stretch in the scene."""
 
     def __init__(self, server: viser.ViserServer, stretch: ConduitStretch, path: str) -> None:
         """Add the rings to the scene as the node ``path``."""
         self.stretch = stretch
-        count = round(stretch.length / PITCH)
-        pickled = pickle.dumps(stretch)
-        self._poses = kept(lambda: poses(stretch, count), Floats, pickled, str(count))
-        self._steps = np.diff(self._poses, axis=0)
         self._shown = 0.0
-        rings = self._at(0.0)
+        rings = poses(stretch, 0.0)
         self._node = server.scene.add_batched_meshes_simple(
             path,
             *ring(stretch.radius),
@@ -67,14 +60,8 @@ class _StretchNode:
         """Show the stretch at the ``angle`` [rad] of its joint."""
         if abs(angle - self._shown) > ANGLE_WORTH_SENDING:
             self._shown = angle
-            rings = self._at(angle)
+            rings = poses(self.stretch, angle)
             arrange(self._node, rings[:, :4], rings[:, 4:])
-
-    def _at(self, angle: float) -> Floats:
-        """Return the poses (count, 7) of the rings, interpolated between the computed angles."""
-        low, fraction = self.stretch.between(angle)
-        rings: Floats = self._poses[low] + np.float32(fraction) * self._steps[low]
-        return rings
 
 
 class Conduits:
@@ -93,7 +80,7 @@ class Conduits:
     def move(self, angles: Mapping[str, float]) -> None:
         """Show the conduit at the joint ``angles`` [rad], given by joint name."""
         for node in self._stretches:
-            node.bend(angles[node.stretch.hinge.joint])
+            node.bend(angles[node.stretch.joint.name])
 
 
 class ConduitLayer(ViewLayer):
@@ -109,27 +96,18 @@ class ConduitLayer(ViewLayer):
         self._conduits.move(self._robot.joint_values(state.q, state.gripper))
 
 
-def poses(stretch: ConduitStretch, count: int) -> Floats:
-    """Return the poses (A, count, 7) of the rings at each angle: wxyz and position [m].
+def poses(stretch: ConduitStretch, angle: float) -> Floats:
+    """Return the poses (n, 7) of the rings at the ``angle`` [rad]: wxyz and position [m].
 
-    From one angle to the next every ring makes its shortest turn. All seven numbers may therefore
-    be interpolated linearly; the length of the quaternion is then 1 to a thousandth.
+    A ring looks the same however it is turned about the conduit.
     """
-    points, tangents = stretch.courses(stretch.angles, count)
-    wxyz = np.empty((*tangents.shape[:2], 4))
-    wxyz[0] = _shortest_turn(np.broadcast_to((1.0, 0.0, 0.0), tangents[0].shape), tangents[0])
-    for before in range(len(tangents) - 1):
-        turned = _shortest_turn(tangents[before], tangents[before + 1])
-        wxyz[before + 1] = so3.quaternion_product(turned, wxyz[before])
-    return np.concatenate((wxyz, points), axis=2, dtype=np.float32)
-
-
-def _shortest_turn(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return quaternions (n, 4) that turn the unit vectors ``a`` onto ``b``, both (n, 3)."""
-    wxyz = np.column_stack((1.0 + (a * b).sum(axis=1), np.cross(a, b)))
-    # Opposite vectors, which occur only for a = x: of all possible half turns, the one about z.
+    points, tangents = stretch.course(angle, round(stretch.length / PITCH))
+    # The shortest turn of the x axis to each tangent; to the opposite one half a turn about z.
+    wxyz = np.zeros((len(tangents), 4))
+    wxyz[:, 0], wxyz[:, 2:] = 1.0 + tangents[:, 0], tangents[:, :0:-1] * (-1.0, 1.0)
     wxyz[wxyz[:, 0] < BACKWARD] = (0.0, 0.0, 0.0, 1.0)
-    return np.asarray(wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True))
+    wxyz /= np.linalg.norm(wxyz, axis=1, keepdims=True)
+    return np.concatenate((wxyz, points), axis=1, dtype=np.float32)
 
 
 BACKWARD = 1e-9

@@ -16,8 +16,7 @@ from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual
-from katana450.caching import cached_property
-from katana450.extensions.conduit.rings import PITCH, poses, ring
+from katana450.extensions.conduit.rings import poses, ring
 from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
 from katana450.extensions.media.picture import Translucent
 from katana450.extensions.media.scene import Item
@@ -74,7 +73,7 @@ class RenderStage:
         return [
             Item(
                 CONDUIT,
-                bendable.bent(angles[bendable.stretch.hinge.joint]),
+                bendable.bent(angles[bendable.stretch.joint.name]),
                 frames[bendable.stretch.start.link],
             )
             for bendable in self._stretches
@@ -120,15 +119,9 @@ class _BendableStretch:
         self._vertices, self._faces = ring(stretch.radius)
         self._normals = smooth_normals(self._vertices, self._faces)
 
-    @cached_property
-    def _poses(self) -> FloatArray:
-        """The poses (A, count, 7) of the rings: quaternion wxyz and position [m]."""
-        return np.asarray(poses(self.stretch, round(self.stretch.length / PITCH)), dtype=float)
-
     def bent(self, angle: float) -> VisualMesh:
         """Return its mesh for the joint at ``angle`` [rad], in the frame of its first link."""
-        low, fraction = self.stretch.between(angle)
-        rings = self._poses[low] + fraction * (self._poses[low + 1] - self._poses[low])
+        rings = np.asarray(poses(self.stretch, angle), dtype=float)
         R = np.array([so3.from_quaternion(pose) for pose in rings[:, :4]])
         vertices = np.einsum("rij,vj->rvi", R, self._vertices) + rings[:, None, 4:]
         normals = np.einsum("rij,vj->rvi", R, self._normals)
