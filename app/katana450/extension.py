@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from katana450.arm.runtime.pipes.arm_listener import ArmAddress, Greeting
+    from katana450.arm.runtime.pipes.private_listener import Greeting, PrivateAddress
     from katana450.arm.runtime.tick import TickRecord
     from katana450.maths.collision.world import CollisionWorld
     from katana450.settings import Settings
@@ -92,7 +92,7 @@ class ServerFacts:
     urdf: Path
     tool: str | None
     port: int
-    address: ArmAddress
+    address: PrivateAddress
     options: Namespace
     folder: Path
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from multiprocessing.connection import Listener
 from pathlib import Path
@@ -11,13 +10,13 @@ from typing import Any
 import pytest
 
 from katana450.arm.runtime.pipes.guarded_pipe import disconnect
+from katana450.arm.runtime.pipes.private_listener import PrivateAddress
 from katana450.errors import InputError
 from katana450.extensions.recording.live import recorder_link
 from katana450.extensions.recording.live.recorder_link import (
     ENTRY,
     RecorderLink,
     RecorderListener,
-    recorder_file,
 )
 from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.platform_support import pipe_address
@@ -35,24 +34,26 @@ class Page:
 
 @pytest.fixture(autouse=True)
 def _soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("ACCEPT_SECONDS", "RECONNECT_SECONDS"):
-        monkeypatch.setattr(recorder_link, name, 0.02)
-
-
-def linked(page: Page, file: Path) -> RecorderLink:
-    return RecorderLink(page, file, 0.0)  # type: ignore[arg-type]
+    monkeypatch.setattr(recorder_link, "RECONNECT_SECONDS", 0.02)
 
 
 @pytest.fixture
-def listen(bench: Bench, tmp_path: Path) -> Iterator[Callable[..., RunningScripts]]:
+def address(tmp_path: Path) -> PrivateAddress:
+    return PrivateAddress(pipe_address(tmp_path, "test"), b"a key")
+
+
+def linked(page: Page, address: PrivateAddress) -> RecorderLink:
+    return RecorderLink(page, address, 0.0)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def listen(bench: Bench, address: PrivateAddress) -> Iterator[Callable[..., RunningScripts]]:
     """Return a function that listens in this process, and returns the scripts that it hears of."""
     listeners: list[RecorderListener] = []
 
     def begin(keeper: object = None) -> RunningScripts:
-        scripts, address = RunningScripts(), pipe_address(tmp_path, "test")
-        file = recorder_file(tmp_path, 8080)
-        present = keeper or bench.keeper
-        listeners.append(RecorderListener(present, scripts, file, address, b"salt"))  # type: ignore[arg-type]
+        scripts, present = RunningScripts(), keeper or bench.keeper
+        listeners.append(RecorderListener(present, scripts, address, b"salt"))  # type: ignore[arg-type]
         return scripts
 
     yield begin
@@ -63,7 +64,7 @@ def listen(bench: Bench, tmp_path: Path) -> Iterator[Callable[..., RunningScript
 def test_requests_are_answered_and_the_state_is_shown(
     bench: Bench,
     listen: Callable[..., RunningScripts],
-    tmp_path: Path,
+    address: PrivateAddress,
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -77,7 +78,7 @@ def test_requests_are_answered_and_the_state_is_shown(
 
     monkeypatch.setattr(Listener, "accept", accept_later)
     page = Page()
-    link = linked(page, recorder_file(tmp_path, 8080))
+    link = linked(page, address)
     with pytest.raises(InputError, match="is not ready"):
         link.ask(StartEpisode(), ADA)
     listen()
@@ -96,11 +97,11 @@ def test_requests_are_answered_and_the_state_is_shown(
 
 
 def test_without_a_folder_of_episodes_the_reason_is_the_answer(
-    listen: Callable[..., RunningScripts], tmp_path: Path
+    listen: Callable[..., RunningScripts], address: PrivateAddress
 ) -> None:
     page = Page()
     scripts = listen(InputError("Another server uses it."))
-    link = linked(page, recorder_file(tmp_path, 8080))
+    link = linked(page, address)
     until(lambda: link._connection)
     with pytest.raises(InputError, match="Another server uses it"):
         link.ask(StartEpisode(), ADA)
@@ -109,10 +110,10 @@ def test_without_a_folder_of_episodes_the_reason_is_the_answer(
 
 
 def test_scripts_are_noted_again_and_end_with_the_process_that_runs_them(
-    listen: Callable[..., RunningScripts], tmp_path: Path
+    listen: Callable[..., RunningScripts], address: PrivateAddress
 ) -> None:
     page = Page()
-    link = linked(page, recorder_file(tmp_path, 8080))
+    link = linked(page, address)
     link.note("early", "name: early", 1.0, None)
     link.note("early", "name: early", 1.0, 2.0)
     link.note("long", "name: long", 3.0, None)
@@ -124,25 +125,25 @@ def test_scripts_are_noted_again_and_end_with_the_process_that_runs_them(
     assert [run.name for run in scripts.read()] == ["long"]
     # The process that records is started again.
     newest = link._connection
+    assert newest is not None
     scripts = listen()
     disconnect(newest)
     until(lambda: 3.0 in scripts._runs)
     until(lambda: link._connection not in (None, newest))
     # The page's server ends.
-    link._file.unlink()
+    link._address = PrivateAddress(f"{address.name}-gone", b"")
+    assert link._connection is not None
     disconnect(link._connection)
     until(lambda: scripts._runs[3.0].ended is not None)
 
 
 def test_process_that_hangs_is_not_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    address: PrivateAddress, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recorder_link, "GREETING_SECONDS", 0.05)
-    address, file = pipe_address(tmp_path, "hangs"), recorder_file(tmp_path, 8080)
     page = Page()
-    with Listener(address):
-        file.write_text(json.dumps({"address": address, "key": "00" * 32}))
-        link = linked(page, file)
+    with Listener(address.name):
+        link = linked(page, address)
         until(lambda: ENTRY in page.shown)
         with pytest.raises(InputError, match="is not ready"):
             link.ask(StartEpisode(), ADA)

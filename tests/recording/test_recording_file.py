@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 import katana450
-from katana450.arm.runtime.pipes.arm_listener import ArmAddress
+from katana450.arm.runtime.pipes.private_listener import PrivateAddress
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
@@ -313,9 +313,10 @@ def test_scene_of_a_server_is_attached_to_its_recordings(
 ) -> None:
     scene = tmp_path / "scene.yaml"
     scene.write_text("objects: []\n", encoding="utf-8")
-    address = ArmAddress(str(tmp_path / "arm"), b"key")
+    address = PrivateAddress(str(tmp_path / "arm"), b"key")
     facts = ServerFacts(Settings(), URDF_PATH, None, 8080, address, Namespace(), tmp_path)
-    config = recorder.RecorderConfig(facts, tmp_path / "ring", tmp_path / "episodes", scene)
+    folders = tmp_path / "ring", tmp_path / "episodes"
+    config = recorder.RecorderConfig(facts, *folders, address, scene)
     ring, _ = recorder._ring(config, RunningScripts())
     run(20, 1, ring.put, swinging, odd=False)
     ring.close()

@@ -26,8 +26,9 @@ from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES, Outcomes
 from katana450.arm.runtime.pipes.arm_end import ArmEnd, CommandMessage
-from katana450.arm.runtime.pipes.arm_listener import FRONT, Greeting
+from katana450.arm.runtime.pipes.arm_roles import FRONT
 from katana450.arm.runtime.pipes.front_end import FrontEnd
+from katana450.arm.runtime.pipes.private_listener import Greeting
 from katana450.assembly import running_arm
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.assembly.running_arm import RunningArm

@@ -13,7 +13,8 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING
 
-from katana450.arm.runtime.pipes.arm_listener import FRONT, RECORD, STOP, ArmListener, Roles
+from katana450.arm.runtime.pipes.arm_roles import FRONT, RECORD, STOP
+from katana450.arm.runtime.pipes.private_listener import PrivateListener, Roles
 from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorPipe
 from katana450.extension import ServerFacts, results
 
@@ -66,7 +67,7 @@ def run_arm(
     for sender in results("tick_sender", config.options):
         arm.record(sender)
         roles[RECORD] = sender.attach
-    listener = ArmListener(config.address, roles)
+    listener = PrivateListener(config.address, roles, "the arm's process")
     if not again:
         for note in arm.notes:
             print(f"katana450: {note}", file=sys.stderr, flush=True)

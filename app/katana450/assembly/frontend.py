@@ -10,8 +10,9 @@ from threading import Event
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.detour_planner import DetourPlanner
-from katana450.arm.runtime.pipes.arm_listener import FRONT, Greeting, connect, connect_when_ready
+from katana450.arm.runtime.pipes.arm_roles import FRONT
 from katana450.arm.runtime.pipes.front_end import FrontEnd
+from katana450.arm.runtime.pipes.private_listener import Greeting, connect, connect_when_ready
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import find_robot

@@ -21,7 +21,7 @@ from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.pipes.arm_end import ArmEnd
-from katana450.arm.runtime.pipes.arm_listener import Greeting
+from katana450.arm.runtime.pipes.private_listener import Greeting
 from katana450.arm.runtime.pipes.state_publisher import StatePublisher
 from katana450.arm.runtime.pipes.stop_end import StopEnd
 from katana450.assembly.robot_session import DescribedRobot

@@ -10,7 +10,8 @@ import socket
 import time
 from functools import partial
 
-from katana450.arm.runtime.pipes.arm_listener import STOP, Greeting, connect_when_ready
+from katana450.arm.runtime.pipes.arm_roles import STOP
+from katana450.arm.runtime.pipes.private_listener import Greeting, connect_when_ready
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.extension import ServerFacts
 from katana450.platform_support import raise_priority

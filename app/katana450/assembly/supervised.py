@@ -17,10 +17,10 @@ from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from katana450.arm.runtime.pipes.arm_listener import (
-    RECORD,
-    ArmAddress,
+from katana450.arm.runtime.pipes.arm_roles import RECORD
+from katana450.arm.runtime.pipes.private_listener import (
     Greeting,
+    PrivateAddress,
     connect_when_ready,
 )
 from katana450.arm.runtime.readiness import writable
@@ -228,7 +228,7 @@ def _end_after(supervisor: SupervisorPipe, failure: threading.ExceptHookArgs) ->
         os._exit(1)
 
 
-def connected_to_ticks(address: ArmAddress, ended: threading.Event) -> Connection:
+def connected_to_ticks(address: PrivateAddress, ended: threading.Event) -> Connection:
     """Return a new pipe as soon as the arm's process listens at ``address``.
 
     Raises EOFError when ``ended`` is set first.

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from katana450.arm.runtime.pipes.arm_listener import ArmAddress
+from katana450.arm.runtime.pipes.private_listener import PrivateAddress
 from katana450.assembly.arm_process import ARM, run_arm
 from katana450.assembly.event_log.disk_log import DiskLog, default_folder
 from katana450.assembly.frontend_process import OPEN, Sockets, run_frontend
@@ -143,7 +143,7 @@ class _Server:
         port = self.sockets.pages.getsockname()[1]
         url = settings.public_url or local_url(settings, port)
         folder, claimed = _private_folder()
-        address = ArmAddress(pipe_address(folder, "arm"), os.urandom(32))
+        address = PrivateAddress(pipe_address(folder, "arm"), os.urandom(32))
         facts = ServerFacts(settings, options.urdf, options.tool, port, address, options, folder)
         front_end_work = _FrontendWork(facts, self.sockets, event_log)
         stop = partial(run_stop, facts, self.stopping_socket)

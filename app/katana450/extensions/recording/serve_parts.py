@@ -5,10 +5,12 @@ It loads nothing heavy before it is used.
 
 from __future__ import annotations
 
+import os
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from katana450.arm.runtime.pipes.private_listener import PrivateAddress
 from katana450.errors import ConfigurationError
 from katana450.extension import ExtraProcess, ServerFacts, TickSender
 
@@ -50,18 +52,20 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
     from katana450.extensions.recording.folders import default_folder
     from katana450.extensions.recording.live.recorder import RecorderConfig, run_recorder
 
+    # The page's server, which gets the options too, finds the process by it.
+    options.recorder = PrivateAddress(f"{facts.address.name}-recorder", os.urandom(32))
     folder = options.record or default_folder(facts.port)
     # An option of the extension ``importers``.
     scene: Path | None = getattr(options, "scene", None)
     scene = None if scene is None else scene.absolute()
-    config = RecorderConfig(facts, folder, _episodes_folder(options, facts.port), scene)
+    episodes = _episodes_folder(options, facts.port)
+    config = RecorderConfig(facts, folder, episodes, options.recorder, scene)
     return ExtraProcess(
         "katana450 rec",
         "The process that records",
         run_recorder,
         config,
-        f"Recording: the last ten minutes of motion are kept in {folder}, "
-        f"episodes in {config.episodes}",
+        f"Recording: the last ten minutes of motion are kept in {folder}, episodes in {episodes}",
     )
 
 
@@ -86,11 +90,13 @@ def routes(context: RouteContext) -> list[BaseRoute]:
     episodes: Path | None = None
     link: RecorderLink | None = None
     if options is not None and not options.no_record:
-        from katana450.extensions.programs.server.program_runner import ProgramRunner
-        from katana450.extensions.recording.live.recorder_link import RecorderLink, recorder_file
-
         folder, episodes = options.record or default_folder(port), _episodes_folder(options, port)
-        link = RecorderLink(context.hub, recorder_file(folder, port))
+    address = getattr(options, "recorder", None)
+    if address is not None:
+        from katana450.extensions.programs.server.program_runner import ProgramRunner
+        from katana450.extensions.recording.live.recorder_link import RecorderLink
+
+        link = RecorderLink(context.hub, address)
         if isinstance(context.hub.runner, ProgramRunner):
             context.hub.runner.follow_run = link.note
 

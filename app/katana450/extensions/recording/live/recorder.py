@@ -21,6 +21,7 @@ from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.platform_support import lower_priority
 
 if TYPE_CHECKING:
+    from katana450.arm.runtime.pipes.private_listener import PrivateAddress
     from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
     from katana450.extensions.recording.files.header import RecordingHeader
     from katana450.extensions.recording.live.recorder_link import RecorderListener
@@ -50,12 +51,14 @@ class RecorderConfig:
         facts: what it knows of the server.
         folder: folder of the ring.
         episodes: folder of the episodes.
+        address: address of this process for the page's server.
         scene: file of the initial scene; None without one.
     """
 
     facts: ServerFacts
     folder: Path
     episodes: Path
+    address: PrivateAddress
     scene: Path | None = None
 
 
@@ -131,13 +134,11 @@ def _listener(
     ended: threading.Event,
 ) -> RecorderListener | None:
     """Return what takes requests of the page's server; None if it cannot, or the server ends."""
-    from katana450.extensions.recording.live.recorder_link import RecorderListener, recorder_file
+    from katana450.extensions.recording.live.recorder_link import RecorderListener
 
-    file = recorder_file(config.folder, config.facts.port)
     try:
-        address = f"{config.facts.address.name}-recorder"
-        return RecorderListener(keeper, scripts, file, address, salt)
-    except (InputError, OSError) as error:
+        return RecorderListener(keeper, scripts, config.address, salt)
+    except OSError as error:
         # A server that ends removes the folder of the address.
         if not ended.wait(END_NOTICE_TIME):
             log.error("Episodes and scripts cannot be recorded: %s", error)

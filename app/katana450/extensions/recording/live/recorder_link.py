@@ -1,30 +1,31 @@
 """The connection between the page's server and the process that records.
 
-The process that records listens in the private folder of the server. Address and key stand in a
-file of the folder of the ring that only this user can read. Requests about episodes and notes of
-scripts go to it; answers and the state of the episodes come back.
+The process that records listens in the private folder of the server. Requests about episodes and
+notes of scripts go to it; answers and the state of the episodes come back.
 """
 
 from __future__ import annotations
 
-import json
 import logging
-import secrets
 import threading
 import time
 import weakref
 from contextlib import suppress
 from itertools import count
-from multiprocessing import AuthenticationError
-from multiprocessing.connection import Client, Listener, answer_challenge, deliver_challenge
-from pathlib import Path
+from multiprocessing.connection import Connection
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from katana450.arm.runtime.pipes.guarded_pipe import PIPE_ERRORS, GuardedPipe
-from katana450.atomic import write_files, writer_of
+from katana450.arm.runtime.pipes.guarded_pipe import PIPE_ERRORS
+from katana450.arm.runtime.pipes.private_listener import (
+    Greeting,
+    PrivateAddress,
+    PrivateListener,
+    Roles,
+    connect,
+)
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import EpisodeGiver
 from katana450.extensions.recording.live.running_scripts import RunningScripts, ScriptNote
@@ -40,9 +41,6 @@ IDLE_SECONDS = 60.0
 
 ACTIVE_SECONDS = 0.5
 """[s] Time between two states of the episodes while one runs."""
-
-ACCEPT_SECONDS = 0.5
-"""[s] Time after a connection that could not be accepted until the next one."""
 
 START_DELAY = 2.0
 """[s] Time in which the process that records is not yet ready."""
@@ -98,9 +96,8 @@ class EpisodesState(msgspec.Struct, frozen=True, tag="state"):
     state: dict[str, Any]
 
 
-def recorder_file(ring: Path, port: int) -> Path:
-    """Return the file with address and key of the process that records for the page on ``port``."""
-    return ring.absolute() / f".recorder-{port}.json"
+PAGE = "page"
+"""Role of the page's server. There is one at a time: a new one replaces the one before."""
 
 
 class RecorderListener:
@@ -110,37 +107,23 @@ class RecorderListener:
         self,
         keeper: EpisodeKeeper | InputError,
         scripts: RunningScripts,
-        file: Path,
-        address: str,
+        address: PrivateAddress,
         salt: bytes,
     ) -> None:
-        """Listen at ``address``.
+        """Listen at ``address``. Raises OSError if it cannot be used.
 
         Args:
             keeper: executes the requests about episodes; the reason if there are none.
             scripts: takes the notes of scripts.
-            file: file for the address and the key.
-            address: a socket file in a private folder, or the name of a pipe of Windows.
+            address: address of this process.
             salt: random bytes for the pseudonyms of people, as in the recording.
-
-        Raises:
-            InputError: the file cannot be written.
-            OSError: the address cannot be used.
         """
         self._keeper, self._scripts, self._pseudonyms = keeper, scripts, Pseudonyms(salt)
-        self._key = secrets.token_bytes(32)
-        # A process that was killed leaves its socket file.
-        with suppress(OSError):
-            Path(address).unlink()
-        self._closed = False
-        self._newest: Any = None
+        self._newest: Connection | None = None
         self._sending = threading.Lock()
-        # Without a key: a client that stalls in its handshake must not keep others out.
-        self._listener = Listener(address, backlog=8)
-        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        text = json.dumps({"address": address, "key": self._key.hex()}).encode()
-        write_files({file: writer_of(text)}, mode=0o600)
-        threading.Thread(target=self._accept, name="recorder link", daemon=True).start()
+        roles: Roles = {PAGE: self._serve}
+        self._listener = PrivateListener(address, roles, "the process that records")
+        self._listener.start()
         if not isinstance(keeper, InputError):
             threading.Thread(
                 target=self._tick, args=(keeper,), name="episode clock", daemon=True
@@ -148,27 +131,7 @@ class RecorderListener:
 
     def close(self) -> None:
         """Take no more requests."""
-        self._closed = True
-        # Its socket may be gone with the private folder of the server.
-        with suppress(OSError):
-            self._listener.close()
-
-    def _accept(self) -> None:
-        reported = ""
-        while True:
-            try:
-                connection = self._listener.accept()
-            except OSError as error:
-                if self._closed:
-                    return
-                # As when too many files are open: later connections may be accepted.
-                if reported != (reported := str(error)):
-                    log.error("The page's server could not be accepted: %s.", error)
-                time.sleep(ACCEPT_SECONDS)
-                continue
-            threading.Thread(
-                target=self._serve, args=(connection,), name="recorder link", daemon=True
-            ).start()
+        self._listener.close()
 
     def _tick(self, keeper: EpisodeKeeper) -> None:
         """Let the keeper look at the time while an episode runs."""
@@ -180,15 +143,13 @@ class RecorderListener:
                 # The next look must come, whatever happened.
                 log.exception("The clock of the episodes met an error.")
 
-    def _serve(self, connection: Any) -> None:
-        with GuardedPipe(connection, "The connection of the page"), suppress(AuthenticationError):
-            deliver_challenge(connection, self._key)
-            answer_challenge(connection, self._key)
-            # The page's server before this one has ended, and with it what it ran.
-            self._newest = connection
-            self._scripts.end_all(time.perf_counter())
-            self._in_thread(self._send_states, connection)
-            decoder = msgspec.json.Decoder(GivenRequest | ScriptNote)
+    def _serve(self, connection: Connection, _greeting: Greeting) -> None:
+        # The page's server before this one has ended, and with it what it ran.
+        self._newest = connection
+        self._scripts.end_all(time.perf_counter())
+        self._in_thread(self._send_states, connection)
+        decoder = msgspec.json.Decoder(GivenRequest | ScriptNote)
+        try:
             while True:
                 message = decoder.decode(connection.recv_bytes(MAX_MESSAGE_BYTES))
                 if isinstance(message, ScriptNote):
@@ -196,18 +157,18 @@ class RecorderListener:
                 else:
                     # So that the saving of a long episode delays no other request.
                     self._in_thread(self._answer, connection, message)
-        if self._newest is connection:
-            self._scripts.end_all(time.perf_counter())
-        connection.close()
+        finally:
+            if self._newest is connection:
+                self._scripts.end_all(time.perf_counter())
 
     def _in_thread(self, work: Any, *arguments: Any) -> None:
         threading.Thread(target=work, args=arguments, name="episode request", daemon=True).start()
 
-    def _send(self, connection: Any, message: msgspec.Struct) -> None:
+    def _send(self, connection: Connection, message: msgspec.Struct) -> None:
         with self._sending:
             connection.send_bytes(msgspec.json.encode(message))
 
-    def _send_states(self, connection: Any) -> None:
+    def _send_states(self, connection: Connection) -> None:
         """Send the state whenever it changes, until the other end closes."""
         keeper = self._keeper
         if isinstance(keeper, InputError):
@@ -218,7 +179,7 @@ class RecorderListener:
                 self._send(connection, EpisodesState(keeper.status()))
                 keeper.wait(revision, ACTIVE_SECONDS if keeper.active else IDLE_SECONDS)
 
-    def _answer(self, connection: Any, request: GivenRequest) -> None:
+    def _answer(self, connection: Connection, request: GivenRequest) -> None:
         by = msgspec.structs.replace(request.by, key=self._pseudonyms.of(request.by.key))
         try:
             if isinstance(self._keeper, InputError):
@@ -237,16 +198,19 @@ class RecorderListener:
 class RecorderLink:
     """The end of the page's server. It connects in a thread of its own, again and again."""
 
-    def __init__(self, hub: Hub, file: Path, delay: float = START_DELAY) -> None:
+    def __init__(self, hub: Hub, address: PrivateAddress, delay: float = START_DELAY) -> None:
         """Show the state of the episodes to all pages of ``hub``.
 
-        ``file``: see ``recorder_file``; ``delay``: time until the first attempt to connect [s].
+        Args:
+            hub: the hub of the page's server.
+            address: address of the process that records.
+            delay: time until the first attempt to connect [s].
         """
         # The threads wait when this process ends, and must not keep the hub then.
-        self._hub, self._file, self._delay = weakref.ref(hub), file, delay
+        self._hub, self._address, self._delay = weakref.ref(hub), address, delay
         self._lock = threading.Condition()
         self._numbers = count(1)
-        self._connection: Any = None
+        self._connection: Connection | None = None
         self._pending: dict[int, SimpleQueue[RequestAnswer]] = {}
         self._runs: dict[float, ScriptNote] = {}
         self._sent: SimpleQueue[msgspec.Struct] = SimpleQueue()
@@ -300,8 +264,8 @@ class RecorderLink:
         time.sleep(self._delay)
         decoder = msgspec.json.Decoder(RequestAnswer | EpisodesState)
         while True:
-            with suppress(*PIPE_ERRORS, ValueError, KeyError, TypeError, AuthenticationError):
-                connection = self._connected()
+            with suppress(*PIPE_ERRORS, ValueError):
+                connection = connect(self._address, Greeting(PAGE), GREETING_SECONDS)
                 with self._lock:
                     self._connection = connection
                     self._lock.notify_all()
@@ -316,22 +280,6 @@ class RecorderLink:
             self._lost()
             # A process that ends each connection must not keep this thread busy.
             time.sleep(RECONNECT_SECONDS)
-
-    def _connected(self) -> Any:
-        """Return a connection on which both ends have shown that they know the key."""
-        target = json.loads(self._file.read_bytes())
-        connection: Any = Client(target["address"])
-        try:
-            # A process that hangs accepts connections too.
-            if not connection.poll(GREETING_SECONDS):
-                raise EOFError("The process that records does not answer.")
-            key = bytes.fromhex(target["key"])
-            answer_challenge(connection, key)
-            deliver_challenge(connection, key)
-        except BaseException:
-            connection.close()
-            raise
-        return connection
 
     def _lost(self) -> None:
         """Answer all requests that wait, because the process that records has ended."""

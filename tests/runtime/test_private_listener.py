@@ -1,4 +1,4 @@
-"""Connections to the arm's process: by role, with a key, never held up, and when they are ready."""
+"""Private connections between processes: by role, with a key, never held up, and when ready."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from queue import SimpleQueue
 
 import pytest
 
-from katana450.arm.runtime.pipes.arm_listener import (
-    ArmAddress,
-    ArmListener,
+from katana450.arm.runtime.pipes.private_listener import (
     Greeting,
+    PrivateAddress,
+    PrivateListener,
     connect,
     connect_when_ready,
 )
@@ -25,12 +25,12 @@ from katana450.platform_support import pipe_address
 
 
 @pytest.fixture
-def address(tmp_path: Path) -> ArmAddress:
-    return ArmAddress(pipe_address(tmp_path, "arm"), b"a key")
+def address(tmp_path: Path) -> PrivateAddress:
+    return PrivateAddress(pipe_address(tmp_path, "arm"), b"a key")
 
 
 @pytest.fixture
-def greetings(address: ArmAddress) -> Iterator[SimpleQueue[Greeting]]:
+def greetings(address: PrivateAddress) -> Iterator[SimpleQueue[Greeting]]:
     received: SimpleQueue[Greeting] = SimpleQueue()
     connections: list[Connection] = []
 
@@ -38,14 +38,14 @@ def greetings(address: ArmAddress) -> Iterator[SimpleQueue[Greeting]]:
         connections.append(connection)
         received.put(greeting)
 
-    listener = ArmListener(address, {"front": attach})
+    listener = PrivateListener(address, {"front": attach}, "the process")
     listener.start()
     yield received
     listener.close()
 
 
 def test_connection_is_attached_by_its_role(
-    address: ArmAddress, greetings: SimpleQueue[Greeting]
+    address: PrivateAddress, greetings: SimpleQueue[Greeting]
 ) -> None:
     with connect(address, Greeting("front", 7)):
         assert greetings.get(timeout=5.0) == Greeting("front", 7)
@@ -53,14 +53,14 @@ def test_connection_is_attached_by_its_role(
         unknown.recv()
 
 
-def test_wrong_key_is_refused(address: ArmAddress, greetings: SimpleQueue[Greeting]) -> None:
+def test_wrong_key_is_refused(address: PrivateAddress, greetings: SimpleQueue[Greeting]) -> None:
     with pytest.raises(OSError, match="refused the key"):
-        connect(ArmAddress(address.name, b"another"), Greeting("front"))
+        connect(PrivateAddress(address.name, b"another"), Greeting("front"))
     assert greetings.empty()
 
 
 def test_client_that_stalls_keeps_no_other_out(
-    address: ArmAddress, greetings: SimpleQueue[Greeting]
+    address: PrivateAddress, greetings: SimpleQueue[Greeting]
 ) -> None:
     with Client(address.name), connect(address, Greeting("front")):
         assert greetings.get(timeout=5.0).role == "front"
@@ -74,10 +74,12 @@ class RefusedThread(threading.Thread):
 
 
 def test_connection_for_which_no_thread_starts_keeps_no_later_one_out(
-    address: ArmAddress, greetings: SimpleQueue[Greeting], monkeypatch: pytest.MonkeyPatch
+    address: PrivateAddress, greetings: SimpleQueue[Greeting], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr("katana450.arm.runtime.pipes.arm_listener.threading.Thread", RefusedThread)
+        patch.setattr(
+            "katana450.arm.runtime.pipes.private_listener.threading.Thread", RefusedThread
+        )
         with Client(address.name) as refused:
             assert refused.poll(5.0)
             with pytest.raises((EOFError, OSError)):
@@ -87,17 +89,17 @@ def test_connection_for_which_no_thread_starts_keeps_no_later_one_out(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no socket files")
-def test_socket_file_of_a_killed_process_is_replaced(address: ArmAddress) -> None:
+def test_socket_file_of_a_killed_process_is_replaced(address: PrivateAddress) -> None:
     with socket.socket(socket.AF_UNIX) as left:
         left.bind(address.name)
-    listener = ArmListener(address, {})
+    listener = PrivateListener(address, {}, "the process")
     listener.start()
     connect(address, Greeting("unknown")).close()
     listener.close()
     assert not Path(address.name).exists()
 
 
-def test_waiting_for_the_arm_ends_with_the_server(address: ArmAddress) -> None:
+def test_waiting_for_the_arm_ends_with_the_server(address: PrivateAddress) -> None:
     ended = threading.Event()
     ended.set()
     with pytest.raises(EOFError):

@@ -1,4 +1,4 @@
-"""Private connections to the arm's process, which other processes of this server make by a key."""
+"""Private connections between processes of a server, made by a key: to the arm's, for example."""
 
 from __future__ import annotations
 
@@ -22,17 +22,8 @@ from katana450.arm.runtime.pipes.guarded_pipe import GuardedPipe
 
 log = logging.getLogger(__name__)
 
-FRONT = "front"
-"""Role of the front end. There is one at a time: a new one replaces the one before."""
-
-STOP = "stop"
-"""Role of the process of STOP, of which there is one at a time too."""
-
-RECORD = "record"
-"""Role of the process that records, of which there is one at a time too."""
-
 BACKLOG = 16
-"""Connections that may wait while the arm's process accepts one."""
+"""Connections that may wait while a process accepts one."""
 
 JOIN_SECONDS = 1.0
 """[s] Timeout for the end of the thread that accepts."""
@@ -42,8 +33,8 @@ RETRY_INTERVAL = 0.02
 
 
 @dataclass(frozen=True)
-class ArmAddress:
-    """Address of the arm's process, and the key that every connection must prove to know.
+class PrivateAddress:
+    """Address of a process, and the key that every connection must prove to know.
 
     Attributes:
         name: a socket file in a private folder, or the name of a pipe of Windows.
@@ -70,24 +61,35 @@ class Greeting:
 Roles = dict[str, Callable[[Connection, Greeting], None]]
 
 
-def connect(address: ArmAddress, greeting: Greeting) -> Connection:
-    """Return a new connection to the arm's process.
+def connect(
+    address: PrivateAddress, greeting: Greeting, timeout: float | None = None
+) -> Connection:
+    """Return a new connection to the process that listens at ``address``.
 
-    Raises OSError or EOFError while no process listens there.
+    ``timeout``: maximum time until that process answers [s], since one that hangs accepts
+    connections too; None waits. Raises OSError or EOFError while no process listens there.
     """
+    connection: Any = Client(address.name)
     try:
-        connection: Any = Client(address.name, authkey=address.key)
+        if not connection.poll(timeout):
+            raise EOFError(f"No process answers at {address.name}.")
+        answer_challenge(connection, address.key)
+        deliver_challenge(connection, address.key)
+        connection.send(greeting)
     except AuthenticationError as error:
-        raise ConnectionError("The arm's process refused the key.") from error
-    connection.send(greeting)
+        connection.close()
+        raise ConnectionError(f"The process at {address.name} refused the key.") from error
+    except BaseException:
+        connection.close()
+        raise
     connected: Connection = connection
     return connected
 
 
 def connect_when_ready(
-    address: ArmAddress, greeting: Greeting, ended: threading.Event
+    address: PrivateAddress, greeting: Greeting, ended: threading.Event
 ) -> Connection:
-    """Return a new connection as soon as the arm's process listens.
+    """Return a new connection as soon as the process of ``address`` listens.
 
     Raises EOFError when ``ended`` is set first.
     """
@@ -98,20 +100,22 @@ def connect_when_ready(
             raise EOFError
 
 
-class ArmListener:
+class PrivateListener:
     """Accepts connections in a thread of its own, and hands each to the function of its role."""
 
-    def __init__(self, address: ArmAddress, roles: Roles) -> None:
+    def __init__(self, address: PrivateAddress, roles: Roles, title: str) -> None:
         """Listen at ``address``. Raises OSError if that is not possible.
 
-        ``roles``: a function for each role. It is called in a thread of the connection.
+        Args:
+            address: the address of this process.
+            roles: a function for each role. It is called in a thread of the connection.
+            title: name of this process for people, within a sentence.
         """
         # A process that was killed leaves its socket file. On Windows there is no such file.
         with suppress(OSError):
             Path(address.name).unlink()
-        self._name = address.name
-        self._key = address.key
-        self._roles = roles
+        self._name, self._key = address.name, address.key
+        self._roles, self._title = roles, title
         # Without a key: a client that stalls in its handshake must not keep others out.
         self._listener = Listener(address.name, backlog=BACKLOG)
         self._closed = threading.Event()
@@ -132,13 +136,16 @@ class ArmListener:
             self._listener.close()
 
     def _accept(self) -> None:
+        reported = ""
         while True:
             try:
                 connection: Any = self._listener.accept()
             except OSError as error:
                 if self._closed.wait(RETRY_INTERVAL):
                     return
-                log.error("No connection to the arm's process could be accepted: %s.", error)
+                # As when too many files are open: later connections may be accepted.
+                if reported != (reported := str(error)):
+                    log.error("No connection to %s could be accepted: %s.", self._title, error)
                 continue
             if self._closed.is_set():
                 return
@@ -147,11 +154,11 @@ class ArmListener:
                     target=self._greet, args=(connection,), name="greeting", daemon=True
                 ).start()
             except RuntimeError as error:
-                log.error("A connection to the arm's process was closed: %s.", error)
+                log.error("A connection to %s was closed: %s.", self._title, error)
                 connection.close()
 
     def _greet(self, connection: Any) -> None:
-        with GuardedPipe(connection, "A connection to the arm's process"):
+        with GuardedPipe(connection, f"A connection to {self._title}"):
             try:
                 deliver_challenge(connection, self._key)
                 answer_challenge(connection, self._key)
