@@ -39,13 +39,15 @@ from katana450.extensions.recording.messages import (
     TickMessage,
 )
 from katana450.extensions.recording.ticks import (
-    Checker,
+    Difference,
+    Digester,
     TickInput,
     Verification,
     after,
     check_fits,
     tick_input,
 )
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.portable_rounding import ROUNDS_PORTABLY, can_round_portably, portable_rounding
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -114,22 +116,59 @@ def verify_recording(
     ``progress`` is called with the time [s] of each simulated tick. Raises InputError for a damaged
     recording, and for one of another robot.
     """
-    reader, checker = TickReader(), Checker(session)
+    reader, digester = TickReader(), Digester()
+    state: State | None = None
+    setpoint = np.empty(0)
+    ticks = unknown = 0
+    differences: list[Difference] = []
+    for messages in _by_tick(file, reader):
+        commands, row, checkpoint = map(messages.get, (COMMANDS, STATE, CHECKPOINTS))
+        if row is not None:
+            setpoint = np.array(content_of(row, StateRow).setpoint)
+        tick = None if commands is None else reader.tick(commands)
+        if isinstance(tick, TickMessage):
+            unknown, state = unknown + tick.ticks, None
+        elif tick is not None and state is not None:
+            state = after(session, state, tick)
+            ticks += 1
+            if digester.digest(state) != tick.digest:
+                differences.append(Difference(tick.t, _apart(state.setpoint, setpoint)))
+            if progress is not None:
+                progress(tick.t)
+        elif tick is not None and checkpoint is None:
+            unknown += 1
+        if state is None and checkpoint is not None:
+            # The tick that ended in this state need not be simulated.
+            state = reader.checkpoint(checkpoint)
+            check_fits(session, state)
+    first = differences[0] if differences else None
+    largest = max(differences, key=lambda difference: difference.size, default=None)
+    return Verification(ticks, len(differences), first, largest, unknown)
+
+
+def _by_tick(file: RecordingFile, reader: TickReader) -> Iterator[dict[str, Message]]:
+    """Yield the last message of each topic about a tick, from its commands on.
+
+    ``reader`` takes the values that they share. A part may begin with the state after a tick.
+    """
+    messages: dict[str, Message] = {}
     for message in file.messages(PLANS, SOLIDS, COMMANDS, CHECKPOINTS, STATE):
         if message.topic in KINDS:
             reader.add_shared(message)
-        elif message.topic == STATE:
-            checker.setpoint(np.array(content_of(message, StateRow).setpoint))
-        elif message.topic == CHECKPOINTS:
-            if checker.state is None:
-                checker.checkpoint(reader.checkpoint(message))
-        elif isinstance(tick := reader.tick(message), TickMessage):
-            checker.missing(tick.ticks)
-        else:
-            checker.tick(tick)
-            if progress is not None:
-                progress(message.t)
-    return checker.result
+            continue
+        if message.topic == COMMANDS and messages:
+            yield messages
+            messages = {}
+        messages[message.topic] = message
+    if messages:
+        yield messages
+
+
+def _apart(simulated: FloatArray, recorded: FloatArray) -> float:
+    """Return the largest difference of two setpoints (n,) [rad or m]; 0 of another robot."""
+    if simulated.shape != recorded.shape:
+        return 0.0
+    return float(np.abs(simulated - recorded).max(initial=0.0))
 
 
 def gaps_in(file: RecordingFile, start: float, end: float) -> Iterator[tuple[float, TickMessage]]:
