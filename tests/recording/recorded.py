@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -192,9 +193,8 @@ def dragging(
 def header(*attachments: Attachment) -> RecordingHeader:
     """Return the header of a recording of the shipped arm."""
     katana = described()
-    return header_of(
-        katana.robot, Settings(), URDF_PATH, None, katana.session.environment, attachments
-    )
+    head = header_of(katana.robot, Settings(), URDF_PATH, None, katana.session.environment)
+    return replace(head, attachments=(*head.attachments, *attachments))
 
 
 def swinging(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,18 +14,14 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 import katana450
-from katana450.arm.runtime.pipes.private_listener import PrivateAddress
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
-from katana450.extension import ServerFacts
 from katana450.extensions.export.playback import load_motion
 from katana450.extensions.recording.files import recording_writer
 from katana450.extensions.recording.files.header import (
-    MAX_SCENE_BYTES,
     METADATA,
     RELEVANT,
-    attached_scene,
     differences,
     fingerprint,
 )
@@ -35,10 +30,7 @@ from katana450.extensions.recording.files.recording_writer import MessageWriter,
 from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.extensions.recording.files.table import columns, state_at
 from katana450.extensions.recording.files.trimming import trim
-from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.forms import json_text
-from katana450.extensions.recording.live import recorder
-from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,
@@ -52,12 +44,10 @@ from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.platform_support import claim_file
 from katana450.resources import URDF_PATH
-from katana450.settings import Settings
 from tests.recording.recorded import (
     described,
     header,
     run,
-    swinging,
 )
 
 
@@ -306,26 +296,3 @@ def test_resting_arm_writes_little(tmp_path: Path) -> None:
         # The first two, in which it comes to rest; then there is nothing to record.
         assert verify_recording(file, described().session).ticks == 1
         assert file.counts()[COMMANDS] == 2
-
-
-def test_scene_of_a_server_is_attached_to_its_recordings(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    scene = tmp_path / "scene.yaml"
-    scene.write_text("objects: []\n", encoding="utf-8")
-    address = PrivateAddress(str(tmp_path / "arm"), b"key")
-    facts = ServerFacts(Settings(), URDF_PATH, None, 8080, address, Namespace(), tmp_path)
-    folders = tmp_path / "ring", tmp_path / "episodes"
-    config = recorder.RecorderConfig(facts, *folders, address, scene)
-    ring, _ = recorder._ring(config, RunningScripts())
-    run(20, 1, ring.put, swinging, odd=False)
-    ring.close()
-    (path,) = recordings_in(tmp_path / "ring")
-    with RecordingFile.open(path) as file:
-        attached = {attachment.name: attachment for attachment in file.attachments()}
-    assert set(attached) == {URDF_PATH.name, "scene.yaml"}
-    assert attached["scene.yaml"].data == scene.read_bytes()
-    # What cannot be attached does not keep the server from recording.
-    scene.write_bytes(bytes(MAX_SCENE_BYTES + 1))
-    assert attached_scene(scene) == attached_scene(tmp_path / "none.zip") == ()
-    assert caplog.text.count("is not attached to the recording") == 2

@@ -55,11 +55,8 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
     # The page's server, which gets the options too, finds the process by it.
     options.recorder = PrivateAddress(f"{facts.address.name}-recorder", os.urandom(32))
     folder = options.record or default_folder(facts.port)
-    # An option of the extension ``importers``.
-    scene: Path | None = getattr(options, "scene", None)
-    scene = None if scene is None else scene.absolute()
     episodes = _episodes_folder(options, facts.port)
-    config = RecorderConfig(facts, folder, episodes, options.recorder, scene)
+    config = RecorderConfig(facts, folder, episodes, options.recorder)
     return ExtraProcess(
         "katana450 rec",
         "The process that records",

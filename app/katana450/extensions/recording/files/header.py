@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import logging
 import math
 import platform
 import secrets
 import struct
 import sys
 import time
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -162,11 +161,6 @@ FORMAT: Final = "1"
 
 URDF_MEDIA_TYPE = "application/xml"
 
-MAX_SCENE_BYTES = 1_000_000
-"""Size up to which the file of a scene is attached to each file of a ring."""
-
-log = logging.getLogger(__name__)
-
 
 @dataclass(frozen=True)
 class Attachment:
@@ -179,23 +173,6 @@ class Attachment:
     media_type: str
     data: bytes
     log_time: int = 0
-
-
-def attached_scene(path: Path) -> tuple[Attachment, ...]:
-    """Return the file of the initial scene at ``path``; nothing if it is large or unreadable.
-
-    All its objects are in the complete states too.
-    """
-    try:
-        size = path.stat().st_size
-        if size > MAX_SCENE_BYTES:
-            log.warning("%s is not attached to the recording: it has %d bytes.", path, size)
-            return ()
-        kind = "application/zip" if path.suffix == ".zip" else "application/yaml"
-        return (Attachment(path.name, kind, path.read_bytes()),)
-    except OSError as error:
-        log.warning("%s is not attached to the recording: %s.", path, error.strerror or error)
-        return ()
 
 
 class RecordedSettings(msgspec.Struct, frozen=True):
@@ -239,7 +216,6 @@ def header_of(
     urdf: Path,
     tool: str | None = None,
     environment: Environment | None = None,
-    attachments: Sequence[Attachment] = (),
 ) -> RecordingHeader:
     """Return the header of a recording that begins now. Raises InputError without the URDF.
 
@@ -249,7 +225,6 @@ def header_of(
         urdf: file of the robot, which is attached.
         tool: the link to which targets refer; None for that of the file.
         environment: gives the poses of objects in the hand.
-        attachments: further files, such as that of the scene.
     """
     try:
         described = urdf.read_bytes()
@@ -267,4 +242,4 @@ def header_of(
         **fingerprint(),
     }
     first = Attachment(urdf.name, URDF_MEDIA_TYPE, described)
-    return RecordingHeader(robot, environment, metadata, (first, *attachments))
+    return RecordingHeader(robot, environment, metadata, (first,))

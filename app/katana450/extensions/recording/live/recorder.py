@@ -52,14 +52,12 @@ class RecorderConfig:
         folder: folder of the ring.
         episodes: folder of the episodes.
         address: address of this process for the page's server.
-        scene: file of the initial scene; None without one.
     """
 
     facts: ServerFacts
     folder: Path
     episodes: Path
     address: PrivateAddress
-    scene: Path | None = None
 
 
 def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
@@ -95,16 +93,13 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
 
 def _ring(config: RecorderConfig, scripts: RunningScripts) -> tuple[Ring, RecordingHeader]:
     from katana450.assembly.robot_session import find_robot
-    from katana450.extensions.recording.files.header import attached_scene, header_of
+    from katana450.extensions.recording.files.header import header_of
     from katana450.extensions.recording.live.ring import Ring
 
     facts = config.facts
     robot = find_robot(facts.settings, facts.urdf, facts.tool)
-    attachments = () if config.scene is None else attached_scene(config.scene)
     environment = robot.session.environment
-    header = header_of(
-        robot.robot, facts.settings, facts.urdf, facts.tool, environment, attachments
-    )
+    header = header_of(robot.robot, facts.settings, facts.urdf, facts.tool, environment)
     return Ring(config.folder, header, scripts=scripts), header
 
 
