@@ -26,14 +26,10 @@ if TYPE_CHECKING:
 
     from katana450.arm.runtime.pipes.private_listener import Greeting, PrivateAddress
     from katana450.arm.runtime.tick import TickRecord
-    from katana450.maths.collision.world import CollisionWorld
     from katana450.settings import Settings
 
 Target: TypeAlias = Callable[..., Any] | str
 """A function or class, or where it is: ``"module:name"``, which is imported on first use."""
-
-RobotWorld: TypeAlias = "tuple[CollisionWorld | None, tuple[str, ...], tuple[str, ...]]"
-"""The collision world of a robot, sentences on what it leaves out, and cautions for its driver."""
 
 GROUP = "katana450.extensions"
 """Name of the group of entry points."""
@@ -129,13 +125,9 @@ class Extension:
         commands: Commands of ``katana450``.
         prepare: Completes the options of a command before it runs, whichever extension it is of.
             Raises KatanaError.
-        world: Returns the collision world of a robot, None without shapes, sentences on what it
-            leaves out, and cautions for its driver. Of the first extension that has it.
         hand: Returns the hand of a robot, given its collision world and the hand, completed by its
             sides and its closed end. Called for each session of an arm, in the order of the
             extensions.
-        expand: Returns the URDF (bytes) of a xacro file. Of the first extension that has it. Raises
-            RobotDescriptionError.
         find_arm: Returns the arm outside the five-axis family in a URDF, with its kinematics, or
             None; see ``FindArm``. Called when a robot is read for ``serve``.
         serve_options: Adds options to the parser of ``serve``.
@@ -145,10 +137,6 @@ class Extension:
         view_layer: Returns a layer of the 3D scene according to the options, or None. Raises
             KatanaError.
         routes: Returns routes for the web server, below ``/api/v1``, given a RouteContext.
-        nodes: Returns the values of a robot and its environment that can be read and set by name.
-            Of the first extension that has it.
-        runner: Class that drives the arm over time, with its requests. Of the first extension that
-            has it.
         handler: Class that answers further requests.
         step: A script step, a class derived from ``Step``. Other steps of its module are added too.
         folder: Adds controls to a tab of the panel, given a FolderContext, and returns them, or
@@ -164,16 +152,12 @@ class Extension:
     name: str
     commands: tuple[CliCommand, ...] = ()
     prepare: Target | None = None
-    world: Target | None = None
     hand: Target | None = None
-    expand: Target | None = None
     find_arm: Target | None = None
     serve_options: Target | None = None
     initial_scene: Target | None = None
     view_layer: Target | None = None
     routes: Target | None = None
-    nodes: Target | None = None
-    runner: Target | None = None
     handler: Target | None = None
     step: Target | None = None
     folder: Target | None = None

@@ -48,12 +48,10 @@ if TYPE_CHECKING:
     from katana450.server.api import program_requests as program_requests
     from katana450.server.api import requests as requests
     from katana450.server.service.arm_handle import ArmHandle as ArmHandle
-    from katana450.server.service.arm_handle import Nodes as Nodes
     from katana450.server.service.hub import Hub as Hub
     from katana450.server.service.identity import Identity as Identity
     from katana450.server.service.participants import Participant as Participant
     from katana450.server.service.runner import RequestHandler as RequestHandler
-    from katana450.server.service.runner import Runner as Runner
     from katana450.server.view.layer import LayerContext as LayerContext
     from katana450.server.view.layer import ViewLayer as ViewLayer
     from katana450.server.view.panel_folder import FolderContext as FolderContext

@@ -34,14 +34,15 @@ from katana450.arm.runtime.detour_planner import DetourPlanner
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.planning_worker import PlanningWorker
-from katana450.assembly.gateway import REFUSALS, control_routes
+from katana450.assembly.frontend import NODES
+from katana450.assembly.gateway import REFUSALS, RUNNER, control_routes
 from katana450.assembly.page_routes import page_routes
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.cli.serve_options import add_serve_options
 from katana450.client import Client
 from katana450.client.asynchronous import AsyncClient
 from katana450.client.files import RefusedError, Site
-from katana450.extension import provided
+from katana450.extension import load, provided
 from katana450.server.api import answers, requests
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
@@ -306,7 +307,7 @@ class VirtualServer:
         address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
         self.authenticator = Authenticator(access, 9, address, hub.people)
         budgets = Budgets(now)
-        hub.use_runner(next(provided("runner"))(hub, options))
+        hub.use_runner(load(RUNNER)(hub, options))
         for handler in provided("handler"):
             hub.add_handler(handler(hub, options))
         api = Api(hub, self.authenticator, budgets, options, list(provided("routes")))
@@ -333,7 +334,7 @@ class VirtualServer:
             worker = PlanningWorker(session, self.arm.state_publisher, pipe)
             worker.notify = lambda why: self._soon(hub.announce, why)
             worker.redirected = guarded(hub.runner.redirected)
-        values = next(provided("nodes"))(robot, session.environment)
+        values = load(NODES)(robot, session.environment)
         hub.gate.arm = ArmHandle(robot, session, pipe, worker, values)
         self._detours: DetourPlanner | None = None
         if detours and worker is not None:

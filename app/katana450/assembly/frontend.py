@@ -16,12 +16,15 @@ from katana450.arm.runtime.pipes.private_listener import Greeting, connect, conn
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import find_robot
-from katana450.extension import ServerFacts, results
+from katana450.extension import ServerFacts, load, results
 from katana450.server.service.arm_handle import ArmHandle, Nodes
 from katana450.server.service.command_gate import guarded
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.panel_folder import FolderContext, PanelFolder, PanelTabs
 from katana450.server.view.view import Additions, View
+
+NODES = "katana450.extensions.export.vrml.vrml_nodes:VrmlNodes"
+"""Class of the values that clients read and set by name."""
 
 
 class Frontend:
@@ -77,7 +80,7 @@ class Frontend:
         """
         gateway, hub, pipe = self._gateway, self._gateway.hub, self.pipe
         robot, session, _ = self._found
-        nodes: Nodes = next(results("nodes", robot, session.environment))
+        nodes: Nodes = load(NODES)(robot, session.environment)
         planning_worker = None
         if robot.arm is not None:
             planning_worker = PlanningWorker(session, pipe.state_publisher, pipe)

@@ -31,7 +31,7 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.assembly.page_routes import signed_in
 from katana450.assembly.web_server import WebServer
 from katana450.errors import LeaseError
-from katana450.extension import provided, results
+from katana450.extension import load, provided, results
 from katana450.server.api.fields import MAX_PRESS_LENGTH
 from katana450.server.service import status
 from katana450.server.service.arm_handle import ArmHandle
@@ -57,6 +57,9 @@ REST_TICK = 0.2
 
 ANSWER_SECONDS = 2.0
 """[s] Timeout of a thread of the view for an answer of the server's thread."""
+
+RUNNER = "katana450.extensions.programs.server.program_runner:ProgramRunner"
+"""Class that drives the arm by scripts."""
 
 
 class Gateway:
@@ -110,7 +113,7 @@ class Gateway:
         from katana450.server.web.program_socket import LineServer
 
         hub, authenticator = self.hub, self._web.authenticator
-        hub.use_runner(next(results("runner", hub, options)))
+        hub.use_runner(load(RUNNER)(hub, options))
         for handler in results("handler", hub, options):
             hub.add_handler(handler)
         api = Api(hub, authenticator, self._budgets, options, list(provided("routes")))

@@ -1,15 +1,18 @@
-"""Files of robots, read with the help of extensions."""
+"""Files of robots, also in xacro."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from katana450.arm.robot.arm_reader import FindArm
-from katana450.arm.robot.description import checked, unexpanded
+from katana450.arm.robot.description import checked
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
-from katana450.extension import provided
+from katana450.extension import load as load_part
 from katana450.resources import URDF_PATH
+
+EXPAND = "katana450.extensions.xacro.xacro_file:expanded"
+"""Function that expands xacro."""
 
 
 def read_robot(
@@ -25,6 +28,6 @@ def read_urdf(path: Path) -> bytes:
 
 
 def _expand(path: Path) -> bytes:
-    """Return the URDF that an extension makes of xacro. Raises RobotDescriptionError."""
-    urdf: bytes = next(provided("expand"), unexpanded)(path)
+    """Return the URDF of a file in xacro. Raises RobotDescriptionError."""
+    urdf: bytes = load_part(EXPAND)(path)
     return urdf

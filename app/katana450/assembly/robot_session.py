@@ -8,19 +8,22 @@ from typing import NamedTuple
 
 from katana450.arm.control.objects.environment import Hand
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.messages import UNCHECKED
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.robot.arm_reader import FindArm, OtherArm
 from katana450.arm.robot.bare import bare
-from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
+from katana450.arm.robot.collision import hand_of, scene_objects_of, table
 from katana450.arm.robot.props import load_props, water_environment
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.urdf import Urdf
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError
-from katana450.extension import RobotWorld, provided, results
+from katana450.extension import load, provided, results
 from katana450.maths.collision.world import CollisionWorld
 from katana450.settings import Settings
+
+WORLD = "katana450.extensions.bodies.robot_world:robot_world"
+"""Function that returns the collision world of a robot, None without shapes, sentences on what it
+leaves out, and cautions for its driver."""
 
 
 class DescribedRobot(NamedTuple):
@@ -94,14 +97,7 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
 
 
 def _with_world(robot: Robot) -> tuple[Robot, CollisionWorld | None, tuple[str, ...]]:
-    """Return ``robot`` with its cautions, the world that an extension makes, and notes."""
-    make = next(provided("world"), _world_of_arm)
-    world, notes, cautions = make(robot)
+    """Return ``robot`` with its cautions, its world, and notes."""
+    world, notes, cautions = load(WORLD)(robot)
     notes = (*robot.notes, *robot.joint_notes, *notes, *cautions)
     return replace(robot, cautions=cautions), world, notes
-
-
-def _world_of_arm(robot: Robot) -> RobotWorld:
-    """Return the world of an arm; robots without one are not checked without an extension."""
-    world, notes = (None, ()) if robot.arm is None else world_of(robot)
-    return world, notes, () if world is not None else (UNCHECKED,)

@@ -25,7 +25,6 @@ EXTENSIONS = (
         serve_options=f"{HERE}.programs.serve_options:add_serve_options",
         view_layer=f"{HERE}.programs.server.traces:TracesLayer",
         routes=f"{HERE}.programs.server.script_routes:routes",
-        runner=f"{HERE}.programs.server.program_runner:ProgramRunner",
         folder=f"{HERE}.programs.server.panel:programs_panel",
     ),
     Extension(
@@ -49,7 +48,6 @@ EXTENSIONS = (
                 f"{HERE}.export.options:export_format",
             ),
         ),
-        nodes=f"{HERE}.export.vrml.vrml_nodes:VrmlNodes",
     ),
     Extension(
         "experiments",
@@ -172,10 +170,8 @@ EXTENSIONS = (
         ),
         prepare=f"{HERE}.gallery.options:choose_named",
     ),
-    Extension("bodies", world=f"{HERE}.bodies.robot_world:robot_world"),
     Extension(
         "xacro",
-        expand=f"{HERE}.xacro.xacro_file:expanded",
         prepare=f"{HERE}.xacro.arguments:expand_with_arguments",
     ),
     Extension(

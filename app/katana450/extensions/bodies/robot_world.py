@@ -2,42 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
+from katana450.arm.control.joints import JointSet
+from katana450.arm.control.state.messages import UNCHECKED, short
 from katana450.arm.robot.collision import as_modelled, table, world_of
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
-from katana450.extensions.bodies.estimated_shapes import with_estimates
-from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
+from katana450.extensions.bodies.estimated_shapes import drawn, with_estimates
+from katana450.extensions.bodies.pairs_at_rest import (
+    TOUCH_DISTANCE,
+    RestPairs,
+    judged_at_rest,
+    pairs_at_rest,
+)
 from katana450.extensions.bodies.pieces import pieces
-from katana450.maths.collision.linkage import Linkage
-from katana450.maths.collision.world import CollisionWorld, Part
+from katana450.maths.collision.clearance import MIN_CLEARANCE
+from katana450.maths.collision.linkage import GROUND, Linkage
+from katana450.maths.collision.shape import half_space
+from katana450.maths.collision.world import CollisionWorld, Part, obstacle
+from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.settings import Settings
 
-if TYPE_CHECKING:
-    from katana450.extension import RobotWorld
 
-
-from collections.abc import Collection, Iterator
-from typing import NamedTuple
-
-from katana450.arm.control.joints import JointSet
-from katana450.arm.control.state.messages import UNCHECKED, short
-from katana450.extensions.bodies.estimated_shapes import drawn
-from katana450.extensions.bodies.pairs_at_rest import TOUCH_DISTANCE, RestPairs, judged_at_rest
-from katana450.maths.collision.clearance import MIN_CLEARANCE
-from katana450.maths.collision.linkage import GROUND
-from katana450.maths.collision.shape import half_space
-from katana450.maths.collision.world import obstacle
-from katana450.maths.geometry import se3
-
-
-def robot_world(robot: Robot) -> RobotWorld:
+def robot_world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...], tuple[str, ...]]:
     """Return the bodies and pairs of ``robot``, sentences on what is left out, and cautions.
 
     x is that of ``world_of``. An arm of the five-axis family keeps the pairs that sampled postures
