@@ -27,6 +27,7 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
+from katana450.server.service.limits import ConnectionLimit
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_page import PROGRAM
 from katana450.server.web import acceptor as acceptors
@@ -34,7 +35,6 @@ from katana450.server.web.acceptor import Acceptor, _Connection
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.admission import LIMIT_CLOSE_CODE, SOCKETS, SOCKETS_EACH
 from katana450.server.web.channel import CLOSE_FRAME_TIMEOUT, GoneError
-from katana450.server.web.limits import ConnectionLimit
 from katana450.server.web.listen import WANTED_DESCRIPTORS, listen
 from katana450.server.web.program_socket import ProgramChannel
 from katana450.settings import Settings

@@ -20,13 +20,13 @@ from katana450.server.service.budget import (
     Budgets,
     BusyError,
 )
+from katana450.server.service.limits import SenderBuckets, TokenBucket
 from katana450.server.viser_bridge.flow import (
     MAX_IN_FLIGHT_BYTES,
     MAX_REMEMBERED_FRAMES,
     OVERDUE,
     FlowControl,
 )
-from katana450.server.web.limits import SenderBuckets, TokenBucket
 
 
 class Clocks:

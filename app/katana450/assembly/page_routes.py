@@ -18,6 +18,7 @@ from starlette.routing import Route
 from katana450.arm.control.actor import CommandChannel
 from katana450.assembly import page_files
 from katana450.server.service.identity import Identity
+from katana450.server.service.limits import TokenBucket
 from katana450.server.service.participants import actor_of
 from katana450.server.service.recorder import ACCEPTED, REFUSED, Recorder, stranger
 from katana450.server.service.stop_path import StopPath
@@ -26,7 +27,6 @@ from katana450.server.web import security
 from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import body_of
-from katana450.server.web.limits import TokenBucket
 
 log = logging.getLogger(__name__)
 

@@ -15,10 +15,10 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from katana450.server.api.fields import ROOT
+from katana450.server.service.limits import TokenBucket
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address
 from katana450.server.web.bodies import TOO_MANY
 from katana450.server.web.http_api import RouteContext
-from katana450.server.web.limits import TokenBucket
 
 CODES_PER_SECOND, CODES_BURST = 2.0, 10.0
 """QR codes that are drawn per second, and in a burst, for all pages together."""

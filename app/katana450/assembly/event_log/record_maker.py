@@ -27,8 +27,8 @@ from katana450.arm.control.state.state import Outcome, Verdict
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.assembly.event_log.record_content import content_of
 from katana450.assembly.event_log.records import Record, record, text, utc
+from katana450.server.service.limits import SenderBuckets, TokenBucket
 from katana450.server.service.recorder import Note, Recorder
-from katana450.server.web.limits import SenderBuckets, TokenBucket
 
 STREAM_GAP = 1.0
 """[s] Time without another command after which a stream has ended."""

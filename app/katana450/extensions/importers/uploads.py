@@ -30,6 +30,7 @@ from katana450.server.api.fields import ROOT
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
+from katana450.server.service.limits import ConnectionLimit, SenderBuckets
 from katana450.server.service.participants import actor_of
 from katana450.server.web.admission import client_of, reserved
 from katana450.server.web.authenticator import Authenticator
@@ -41,7 +42,6 @@ from katana450.server.web.bodies import (
     as_json,
     body_of,
 )
-from katana450.server.web.limits import ConnectionLimit, SenderBuckets
 
 
 def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:

@@ -22,10 +22,10 @@ from katana450.extensions.robot_choice.uploaded_robots import keep_robot, upload
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
+from katana450.server.service.limits import TokenBucket
 from katana450.server.service.participants import actor_of
 from katana450.server.web.bodies import NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
 from katana450.server.web.http_api import RouteContext
-from katana450.server.web.limits import TokenBucket
 
 UPLOAD_SECONDS, MIN_RATE = 60.0, 20_000.0
 """Timeout of an upload [s], and its minimum mean rate [bytes/s]."""

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from katana450.errors import InputError
+from katana450.server.service.limits import SenderBuckets, TokenBucket
 
 IDENTITY_BUDGET = 0.25
 """Budget of one identity, and of the driver [s of processor time per second]."""
@@ -52,29 +53,6 @@ class BusyError(InputError):
         self.gone = disconnects
 
 
-class _Account:
-    """Seconds that refill with time. The balance can be negative: a cost is known afterwards."""
-
-    def __init__(self, rate: float, t: float) -> None:
-        self._rate = rate
-        self._left = rate
-        self._t = t
-
-    def left(self, t: float) -> float:
-        """Return the balance [s] at time ``t`` [s]; its maximum is the refill of one second."""
-        self._left = min(self._rate, self._left + self._rate * max(t - self._t, 0.0))
-        self._t = max(t, self._t)
-        return self._left
-
-    def pay(self, cost: float) -> None:
-        """Subtract ``cost`` [s]; the debt is limited to ``MAX_DEBT``."""
-        self._left = max(self._left - cost, -MAX_DEBT)
-
-    def wait(self, t: float) -> float:
-        """Return the time [s] until the debt is paid; 0 without a debt."""
-        return max(-self.left(t), 0.0) / self._rate
-
-
 class Budgets:
     """Accounts of each identity, of the driver, and of all others together."""
 
@@ -84,25 +62,21 @@ class Budgets:
         """Create full accounts. ``processor``: processor time of this thread alone [s]."""
         self.clock = clock
         self.processor = processor
-        self._shared = _Account(SHARED_BUDGET, clock())
-        self._driver = ("", _Account(IDENTITY_BUDGET, clock()))
-        self._known: dict[str, _Account] = {}
+        self._shared = TokenBucket(SHARED_BUDGET, SHARED_BUDGET, clock(), MAX_DEBT)
+        own = IDENTITY_BUDGET, IDENTITY_BUDGET
+        self._identities = SenderBuckets(*own, MAX_ACCOUNTS, debt=MAX_DEBT)
+        self._drivers = SenderBuckets(*own, 1, debt=MAX_DEBT)
 
     def of(self, identity: str) -> Budget:
         """Return the budget of ``identity``."""
         return Budget(self, identity)
 
-    def accounts(self, identity: str, driver: str, *, question: bool) -> tuple[_Account, ...]:
+    def accounts(self, identity: str, driver: str, *, question: bool) -> tuple[TokenBucket, ...]:
         """Return the accounts that pay, the client's own first; see ``Budget.charged``."""
         if driver:
-            if self._driver[0] != driver:
-                self._driver = (driver, _Account(IDENTITY_BUDGET, self.clock()))
-            return (self._driver[1],)
-        # The last used account comes last.
-        own = self._known.pop(identity, None) or _Account(IDENTITY_BUDGET, self.clock())
-        self._known[identity] = own
-        while len(self._known) > MAX_ACCOUNTS:
-            self._known.pop(next(iter(self._known)))
+            # Another driver gets another account.
+            return (self._drivers.bucket_of(driver, self.clock()),)
+        own = self._identities.bucket_of(identity, self.clock())
         return (own, self._shared) if question else (own,)
 
 
@@ -128,7 +102,7 @@ class Budget:
         wait = max(account.wait(t) for account in accounts)
         if wait > 0.0:
             # A refusal takes time too, but the shared account does not pay for it.
-            accounts[0].pay(fixed)
+            accounts[0].spend(fixed)
             raise BusyError(wait, disconnects=accounts[0].left(t) <= -MAX_DEBT)
         began = processor()
         try:
@@ -136,7 +110,7 @@ class Budget:
         finally:
             cost = fixed + processor() - began
             for account in accounts:
-                account.pay(cost)
+                account.spend(cost)
 
     def is_exhausted(self) -> bool:
         """Return whether the debt is more than half of ``MAX_DEBT``."""

@@ -15,8 +15,8 @@ from typing import Any
 import msgspec
 from viser import _messages as wire
 
+from katana450.server.service.limits import TokenBucket
 from katana450.server.viser_bridge.guard import Guard
-from katana450.server.web.limits import TokenBucket
 from katana450.server.web.security import MAX_MESSAGE_BYTES
 
 log = logging.getLogger(__name__)

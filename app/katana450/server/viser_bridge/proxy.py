@@ -19,6 +19,7 @@ from katana450.errors import InputError
 from katana450.server.service.heartbeats import LeastDelay
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE, Identity
+from katana450.server.service.limits import ConnectionLimit
 from katana450.server.service.participants import actor_of, key_of
 from katana450.server.service.people import Connection
 from katana450.server.viser_bridge.flow import FlowControl
@@ -28,7 +29,6 @@ from katana450.server.viser_bridge.message_filter import FilterResult, MessageFi
 from katana450.server.viser_bridge.viser_server import KEY_HEADER
 from katana450.server.web.admission import address_of, reserved
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
-from katana450.server.web.limits import ConnectionLimit
 
 log = logging.getLogger(__name__)
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from ipaddress import IPv6Address
 
 from katana450.caching import cached_property
-from katana450.server.web.limits import SenderBuckets, TokenBucket
+from katana450.server.service.limits import SenderBuckets, TokenBucket
 
 log = logging.getLogger(__name__)
 

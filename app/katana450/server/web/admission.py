@@ -17,11 +17,11 @@ from katana450.arm.control.lease import Role
 from katana450.errors import InputError
 from katana450.server.api.fields import STOP_PATHS
 from katana450.server.service.identity import Identity
+from katana450.server.service.limits import ConnectionLimit
 from katana450.server.service.participants import actor_of
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import TOO_MANY, refusal
-from katana450.server.web.limits import ConnectionLimit
 from katana450.server.web.security import FOR_PROGRAMS
 
 if TYPE_CHECKING:

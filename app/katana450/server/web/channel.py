@@ -24,12 +24,12 @@ from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import ARRIVAL, LATE_RETRY, PING, LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
+from katana450.server.service.limits import TokenBucket
 from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.service.people import Connection
 from katana450.server.web.admission import LIMIT_CLOSE_CODE
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
-from katana450.server.web.limits import TokenBucket
 
 log = logging.getLogger(__name__)
 

@@ -26,6 +26,7 @@ from katana450.server.service.dispatcher import driver_key
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
+from katana450.server.service.limits import ConnectionLimit
 from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
@@ -44,7 +45,6 @@ from katana450.server.web.channel import (
     JsonChannel,
     WebSocketJsonChannel,
 )
-from katana450.server.web.limits import ConnectionLimit
 
 log = logging.getLogger(__name__)
 

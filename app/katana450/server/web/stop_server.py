@@ -31,6 +31,7 @@ from katana450.server.api.fields import API, MAX_PRESS_LENGTH, STOP_PATHS
 from katana450.server.api.outcome_answers import Refused
 from katana450.server.api.stop_requests import Hello, Stop
 from katana450.server.service.identity import PAGE, Identity
+from katana450.server.service.limits import SenderBuckets
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import (
     TOKEN_REQUIRED,
@@ -39,7 +40,6 @@ from katana450.server.web.authenticator import (
     Authenticator,
     framing_fault,
 )
-from katana450.server.web.limits import SenderBuckets
 
 log = logging.getLogger(__name__)
 

@@ -10,44 +10,69 @@ from contextlib import contextmanager
 class TokenBucket:
     """Tokens that refill with time. An event takes tokens, and is refused if too few are left."""
 
-    def __init__(self, rate: float, size: float, t: float) -> None:
-        """Fill the bucket at time ``t`` [s]. ``rate``: refill per second. ``size``: maximum."""
-        self._rate = rate
-        self._size = size
+    def __init__(self, rate: float, size: float, t: float, debt: float = 0.0) -> None:
+        """Fill the bucket at time ``t`` [s].
+
+        ``rate``: refill per second. ``size``: maximum. ``debt``: maximum of the tokens that are
+        spent beyond those that there are.
+        """
+        self._rate, self._size, self._debt = rate, size, debt
         self._left = size
         self._t = t
 
-    def take(self, t: float, tokens: float = 1.0) -> bool:
-        """Take ``tokens`` at time ``t`` [s] and return True; take none if too few are left."""
+    def left(self, t: float) -> float:
+        """Return the number of tokens at time ``t`` [s]; negative for a debt."""
         self._left = min(self._size, self._left + self._rate * max(t - self._t, 0.0))
         self._t = max(t, self._t)
-        if tokens > self._left:
+        return self._left
+
+    def take(self, t: float, tokens: float = 1.0) -> bool:
+        """Take ``tokens`` at time ``t`` [s] and return True; take none if too few are left."""
+        if tokens > self.left(t):
             return False
         self._left -= tokens
         return True
+
+    def spend(self, tokens: float) -> None:
+        """Take ``tokens``, whose number is known only now, also beyond those that are left."""
+        self._left = max(self._left - tokens, -self._debt)
+
+    def wait(self, t: float) -> float:
+        """Return the time [s] from ``t`` [s] until there is no debt; 0 without one."""
+        return max(-self.left(t), 0.0) / self._rate
 
 
 class SenderBuckets:
     """A bucket for each sender, filled at its first event, and one for all together."""
 
     def __init__(
-        self, rate: float, size: float, maximum: int, total: TokenBucket | None = None
+        self,
+        rate: float,
+        size: float,
+        maximum: int,
+        total: TokenBucket | None = None,
+        debt: float = 0.0,
     ) -> None:
-        """Create no bucket yet; ``rate`` and ``size`` are those of each.
+        """Create no bucket yet; ``rate``, ``size`` and ``debt`` are those of each.
 
         ``maximum``: number of buckets that are kept; a new one replaces the oldest. ``total``: the
         bucket for all senders together; None for none.
         """
-        self._rate, self._size, self._maximum, self._total = rate, size, maximum, total
+        self._bounds, self._debt, self._maximum, self._total = (rate, size), debt, maximum, total
         self._buckets: dict[str, TokenBucket] = {}
 
-    def take(self, sender: str, t: float) -> bool:
-        """Take a token of ``sender`` at time ``t`` [s]; return False if none is left."""
-        bucket = self._buckets.pop(sender, None) or TokenBucket(self._rate, self._size, t)
+    def bucket_of(self, sender: str, t: float) -> TokenBucket:
+        """Return the bucket of ``sender``, which is filled at time ``t`` [s] if it is new."""
+        bucket = self._buckets.pop(sender, None) or TokenBucket(*self._bounds, t, self._debt)
         self._buckets[sender] = bucket
         if len(self._buckets) > self._maximum:
             del self._buckets[next(iter(self._buckets))]
-        return bucket.take(t) and (self._total is None or self._total.take(t))
+        return bucket
+
+    def take(self, sender: str, t: float) -> bool:
+        """Take a token of ``sender`` at time ``t`` [s]; return False if none is left."""
+        own = self.bucket_of(sender, t).take(t)
+        return own and (self._total is None or self._total.take(t))
 
     def __len__(self) -> int:
         """Return the number of buckets."""
