@@ -107,7 +107,9 @@ def _lowest(scene_object: SceneObject) -> float:
 
 def is_over(scene_object: SceneObject, other: SceneObject) -> bool:
     """Return whether the middle of ``scene_object`` is over the level top of ``other``."""
-    if other.name == scene_object.name or other.carried or other.shape is Shape.SPHERE:
+    if other.name == scene_object.name or other.carried or other.zone:
+        return False
+    if other.shape is Shape.SPHERE:
         return False
     if other.T[2, 2] < MIN_UPRIGHT:
         return False

@@ -89,6 +89,8 @@ class SceneObject:
         scale: factor on ``size``.
         appearance: how it is drawn.
         fixed: whether it is fixed to the hand.
+        zone: whether it is a keep-out zone: the arm and what it carries keep clear of it, and all
+            else passes through it.
     """
 
     name: str
@@ -101,6 +103,7 @@ class SceneObject:
     scale: float = 1.0
     appearance: ObjectAppearance = PLAIN
     fixed: bool = False
+    zone: bool = False
 
     def __post_init__(self) -> None:
         if not (self.name.isprintable() and 0 < len(self.name) <= MAX_NAME_LENGTH):
@@ -137,6 +140,10 @@ class SceneObject:
         object.__setattr__(self, "size", tuple(size.tolist()))
         if self.fixed and self.held:
             raise InputError(f"{self.name!r} must be either fixed to the hand or held by it.")
+        if self.zone and (self.carried or self.can_be_held or self.shape is Shape.VESSEL):
+            raise InputError(
+                f"{self.name!r} is a keep-out zone, so the hand cannot hold it and it is no vessel."
+            )
         T = frozen(se3.validated(self.T, f"The pose of {self.name!r}"))
         if np.abs(T[:3, 3]).max() > MAX_COORDINATE:
             raise InputError(f"{self.name!r} would be more than {MAX_COORDINATE:g} m away.")
@@ -202,7 +209,7 @@ def _properties(scene_object: SceneObject) -> tuple[object, ...]:
     """Return all properties of the object except its pose."""
     key = None if scene_object.solid is None else scene_object.solid.key
     kind = (scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, key)
-    flags = scene_object.can_be_held, scene_object.held, scene_object.fixed
+    flags = scene_object.can_be_held, scene_object.held, scene_object.fixed, scene_object.zone
     return (*kind, *flags, scene_object.appearance)
 
 

@@ -1,0 +1,82 @@
+"""Keep-out zones: the arm and what it carries keep clear of them, all else passes through."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import Reason, State
+from katana450.errors import InputError
+from katana450.maths.collision.clearance import MIN_CLEARANCE
+from katana450.maths.geometry import se3
+from tests.ticks import TICK, settled, until_rest
+
+LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
+"""[rad] A posture from which axis 1 turns the hand towards x = 0.4 m, y = 0."""
+
+ZONE = SceneObject(
+    "door",
+    Shape.BOX,
+    (0.2, 0.1, 0.5),
+    se3.from_rotation_translation(np.eye(3), (0.4, -0.1, 0.02)),
+    zone=True,
+)
+
+
+@pytest.fixture(scope="module")
+def session(shipped: Session) -> Session:
+    return shipped
+
+
+def begun(session: Session, *objects: SceneObject) -> State:
+    state = session.begin(LOW, 0.0, 0.0)
+    return session.step(state, [cmd.ReplaceScene(objects)], TICK)
+
+
+def test_arm_stops_before_a_zone_and_names_it(session: Session) -> None:
+    (*_, end) = until_rest(session, begun(session, ZONE), cmd.Joint(1, -0.6))
+    (finding,) = end.findings
+    assert finding.reason is Reason.CONTACT
+    assert "door" in (finding.parts or ())
+    assert MIN_CLEARANCE <= finding.amount < 2.0 * MIN_CLEARANCE
+    free = until_rest(session, begun(session), cmd.Joint(1, -0.6))[-1]
+    assert free.findings == ()
+
+
+def test_what_the_hand_carries_keeps_out_too(session: Session) -> None:
+    rod = SceneObject("rod", Shape.BOX, (0.3, 0.3, 0.02), np.eye(4), fixed=True)
+    alone = until_rest(session, begun(session, ZONE), cmd.Joint(1, -0.6))[-1]
+    (*_, end) = until_rest(session, begun(session, ZONE, rod), cmd.Joint(1, -0.6))
+    assert end.findings[0].parts is not None
+    assert set(end.findings[0].parts) == {"rod", "door"}
+    assert end.setpoint[0] > alone.setpoint[0]
+
+
+def test_objects_fall_through_a_zone(session: Session) -> None:
+    above = se3.from_rotation_translation(np.eye(3), (0.4, -0.1, 0.3))
+    box = SceneObject("box", Shape.BOX, (0.04, 0.04, 0.04), above, can_be_held=True)
+    state = begun(session, ZONE)
+    state = session.step(state, [cmd.PlaceObject(box)], state.t + TICK)
+    (zone, fallen) = settled(session, state).objects
+    assert zone.T.tolist() == ZONE.T.tolist()
+    assert fallen.T[2, 3] == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    "change", [{"can_be_held": True}, {"held": True}, {"fixed": True},
+               {"shape": Shape.VESSEL, "size": (0.05, 0.1)}]
+)  # fmt: skip
+def test_a_zone_is_nothing_else(change: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="'door' is a keep-out zone"):
+        replace(ZONE, **change)  # type: ignore[arg-type]
+
+
+def test_the_water_s_vessels_cannot_be_zones(session: Session) -> None:
+    for name in ("cup", "basin"):
+        with pytest.raises(InputError, match=f"The {name} cannot be a keep-out zone"):
+            session.check(cmd.PlaceObject(replace(ZONE, name=name)))
