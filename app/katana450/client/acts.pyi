@@ -318,6 +318,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
         size: list[float] | None = ...,
         mesh: str | None = ...,
         can_be_held: bool | None = ...,
+        zone: bool | None = ...,
         scale: float | None = ...,
         colour: str | None = ...,
         opacity: float | None = ...,
@@ -340,6 +341,8 @@ class Acts(Generic[AtRest, Answered, Sent]):
                 (radius). The size of a mesh is that of its file.
             mesh: Key of the mesh, from the answer to its upload.
             can_be_held: Whether the fingers may touch the object; they hold it between both sides.
+            zone: Whether it is a keep-out zone: the arm and what it carries keep clear of it, and
+                objects pass through it.
             scale: Factor on the size.
             colour: Colour such as "#94a3b8", or "own" for the colour of the file.
             opacity: Opacity, 1 for an opaque object.

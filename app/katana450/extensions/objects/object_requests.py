@@ -116,6 +116,7 @@ class ObjectRequests(RequestHandler):
         can_be_held = known is not None and known.can_be_held
         if request.can_be_held is not None:
             can_be_held = request.can_be_held
+        zone = known is not None and known.zone if request.zone is None else request.zone
         return SceneObject(
             request.name,
             shape,
@@ -126,6 +127,7 @@ class ObjectRequests(RequestHandler):
             scale=scale,
             appearance=_appearance(request, PLAIN if known is None else known.appearance),
             fixed=known is not None and known.fixed,
+            zone=zone,
         )
 
     def _attached(self, request: requests.Attach) -> cmd.Command:

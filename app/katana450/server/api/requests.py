@@ -189,6 +189,8 @@ class Place(Request, frozen=True, kw_only=True, eq=False):
             (radius). The size of a mesh is that of its file.
         mesh: Key of the mesh, from the answer to its upload.
         can_be_held: Whether the fingers may touch the object; they hold it between both sides.
+        zone: Whether it is a keep-out zone: the arm and what it carries keep clear of it, and
+            objects pass through it.
         scale: Factor on the size.
         colour: Colour such as "#94a3b8", or "own" for the colour of the file.
         opacity: Opacity, 1 for an opaque object.
@@ -205,6 +207,7 @@ class Place(Request, frozen=True, kw_only=True, eq=False):
     size: Annotated[list[float], Meta(min_length=1, max_length=3)] | None = None
     mesh: Key | None = None
     can_be_held: bool | None = None
+    zone: bool | None = None
     scale: Annotated[float, Meta(ge=1e-3, le=1e3)] | None = None
     colour: Annotated[str, Meta(pattern="^(own|#[0-9a-f]{6})$")] | None = None
     opacity: Annotated[float, Meta(ge=0.05, le=1.0)] | None = None

@@ -307,6 +307,7 @@ def objects(arm: ArmHandle) -> answers.Objects:
                 opacity=scene_object.appearance.opacity,
                 hidden=scene_object.appearance.hidden,
                 fixed=scene_object.fixed,
+                zone=scene_object.zone,
             )
             for scene_object in now.objects
         ]
