@@ -76,16 +76,18 @@ def objects(draw: st.DrawFn, name: str) -> SceneObject:
     colour = draw(st.none() | st.tuples(*(st.integers(0, 255),) * 3))
     look = ObjectAppearance(colour, draw(st.floats(0.05, 1.0)), draw(st.booleans()))
     size = draw(st.lists(st.floats(0.01, 1.0), min_size=form.numbers, max_size=form.numbers))
+    zone = form is not Shape.VESSEL and draw(st.booleans())
     return SceneObject(
         name,
         form,
         tuple(size),
         draw(poses()),
-        draw(st.booleans()),
+        not zone and draw(st.booleans()),
         solid=SOLID if form is Shape.MESH else None,
         scale=draw(st.sampled_from((1.0, 0.5)) | st.floats(0.2, 1.9)),
         appearance=look,
-        fixed=draw(st.booleans()),
+        fixed=not zone and draw(st.booleans()),
+        zone=zone,
     )
 
 
@@ -119,7 +121,7 @@ def test_a_written_scene_is_read_back(scene: Scene) -> None:
         np.testing.assert_allclose(other.size, one.size, atol=1e-9)
         assert other.scale == pytest.approx(one.scale, rel=1e-11)
         assert other.appearance.opacity == pytest.approx(one.appearance.opacity, rel=1e-11)
-        for name in ("name", "shape", "can_be_held", "fixed", "held"):
+        for name in ("name", "shape", "can_be_held", "fixed", "held", "zone"):
             assert getattr(one, name) == getattr(other, name)
         assert (other.appearance.colour, other.appearance.hidden) == (
             one.appearance.colour,
@@ -333,7 +335,7 @@ def test_the_scene_of_the_documents_is_valid() -> None:
     page = Path(__file__).resolve().parents[2] / "docs" / "scenes.md"
     text = page.read_text(encoding="utf-8").partition("```yaml\n")[2].partition("```")[0]
     draft = parsed(re.sub(r".*sha256.*\n", "", text))
-    assert [entry.name for entry in draft.entries] == ["cup", "bracket"]
-    assert draft.entries[1].mesh == MeshFile("meshes/bracket.stl", "mm", "z", None)
-    assert draft.entries[1].fixed
+    assert [entry.name for entry in draft.entries] == ["cup", "door", "bracket"]
+    assert draft.entries[2].mesh == MeshFile("meshes/bracket.stl", "mm", "z", None)
+    assert draft.entries[2].fixed
     assert draft.water == pytest.approx(1.5e-4)

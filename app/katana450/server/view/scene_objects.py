@@ -9,7 +9,7 @@ import viser
 
 from katana450.arm.control.objects.environment import Environment
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
-from katana450.arm.control.state.solid import Solid
+from katana450.arm.control.state.solid import Colour, Solid
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.creases import Drawn, drawn, glb
 from katana450.arm.robot.object_meshes import Meshes
@@ -24,6 +24,9 @@ from katana450.server.viser_bridge.posing import place, turn
 
 COLOUR = (148, 163, 184)
 """Colour of an object without a colour of its own."""
+
+ZONE_COLOUR, ZONE_OPACITY = (245, 158, 11), 0.25
+"""Colour and maximum opacity of a keep-out zone without a colour of its own."""
 
 COAT_SCALE = 1.005
 """Scale of a contact coat relative to its object, so that the two do not flicker."""
@@ -135,6 +138,7 @@ class ObjectShape:
             key,
             own,
             scene_object.appearance.opacity if own else None,
+            scene_object.zone,
         )
         if now != self._is:
             self._is = now
@@ -143,7 +147,7 @@ class ObjectShape:
                 self._coat.remove()
                 self._coat = None
         if not own:
-            _set(self._node, "color", scene_object.appearance.colour or COLOUR)
+            _set(self._node, "color", _colour(scene_object))
             _set(self._node, "opacity", _opacity(scene_object))
         _set(self._node, "scale", self._scale(scene_object))
 
@@ -176,9 +180,11 @@ class ObjectShape:
             self._path,
             surface.vertices.astype(np.float32),
             surface.faces.astype(np.uint32),
-            color=scene_object.appearance.colour or COLOUR,
+            color=_colour(scene_object),
             opacity=_opacity(scene_object),
             side="double" if scene_object.shape is Shape.MESH else "front",
+            cast_shadow=not scene_object.zone,
+            receive_shadow=not scene_object.zone,
             scale=self._scale(scene_object),
         )
 
@@ -260,8 +266,15 @@ def _of(mesh: Any) -> Drawn:
     return drawn(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
+def _colour(scene_object: SceneObject) -> Colour:
+    return scene_object.appearance.colour or (ZONE_COLOUR if scene_object.zone else COLOUR)
+
+
 def _opacity(scene_object: SceneObject) -> float | None:
-    return None if scene_object.appearance.opacity == 1.0 else scene_object.appearance.opacity
+    opacity = scene_object.appearance.opacity
+    if scene_object.zone:
+        return min(opacity, ZONE_OPACITY)
+    return None if opacity == 1.0 else opacity
 
 
 def _set(node: Any, name: str, value: object) -> None:

@@ -113,6 +113,7 @@ def _object_entry(
     for name, true in (
         ("hidden", scene_object.appearance.hidden),
         ("can_be_held", scene_object.can_be_held),
+        ("zone", scene_object.zone),
     ):
         if true:
             entry[name] = True

@@ -72,4 +72,5 @@ def _shape(scene_object: SceneObject) -> tuple[object, ...]:
     return (
         scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, solid, T,
         scene_object.held, scene_object.fixed, scene_object.can_be_held,
+        scene_object.zone,
     )  # fmt: skip

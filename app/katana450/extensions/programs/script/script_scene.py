@@ -169,6 +169,7 @@ class SceneEntry(Declared):
     ] = None
     opacity: Annotated[float, number(MIN_OPACITY, 1.0, about="1 is opaque")] = 1.0
     hidden: Annotated[bool, FLAG.about("Whether it is not drawn")] = False
+    zone: Annotated[bool, FLAG.about("Whether it is a keep-out zone for the arm")] = False
     attach: Annotated[str, choice("hand", "world").about("hand: it moves with the hand")] = "world"
 
     @classmethod
@@ -273,6 +274,7 @@ class SceneDraft(Declared):
                         scale=entry.scale,
                         appearance=entry.appearance,
                         fixed=entry.fixed,
+                        zone=entry.zone,
                     )
                 )
             except InputError as error:
@@ -438,6 +440,8 @@ def _object_difference(
         return f"{entry.name} is {'' if present.carried else 'not '}in the hand"
     if entry.can_be_held is not present.can_be_held:
         return f"{entry.name} can{'' if present.can_be_held else 'not'} be held"
+    if entry.zone is not present.zone:
+        return f"{entry.name} is {'' if present.zone else 'not '}a keep-out zone"
     T = entry.T if T_palm_tool is None or not entry.fixed else T_palm_tool @ entry.T
     if float(np.linalg.norm(T[:3, 3] - present.T[:3, 3])) > SAME_PLACE:
         return f"{entry.name} is at {_point(present.T)}, not at {_point(T)}"
