@@ -8,12 +8,13 @@ The orientations that are tried depend on what the arm can choose:
                         the pitch in the plane of the arm through the point. Where this plane passes
                         beside axis 1, there are two, one for each shoulder posture; the same pitch
                         and roll in both count once.
-    all others          any orientation counts as one.
+    all others          any orientation counts as one: the tool points of many random postures are
+                        counted by voxels.
 
 An orientation counts if a posture takes it with every joint inside its limits, and no axis from the
 third on is below the table where its link begins. Contacts of bodies are not checked. Of seven axes
-some arm angles are tried, and the search of a point begins at few postures; so both can
-miss an orientation, but count none too many.
+some arm angles are tried, and random postures can leave out a voxel; so both can miss an
+orientation, but count none too many.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,17 +31,13 @@ from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.descent import Descent, Regularity
 from katana450.extensions.general_arms.links import DHLinks, links_of
-from katana450.extensions.general_arms.numerical import search_of
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import Kinematics
-from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.tool import ToolTarget
 
 BoolArray = npt.NDArray[np.bool]
 """An array of truth values."""
@@ -50,23 +47,6 @@ IntArray = npt.NDArray[np.int64]
 
 ARM_ANGLES: Final = 16
 """Number of arm angles of seven axes that are tried for a pose."""
-
-
-class Orientations(Protocol):
-    """The orientations that an arm can choose from at a point.
-
-    Attributes:
-        number: how many are tried.
-        poses_at_once: the number of poses that are solved at once for each point.
-    """
-
-    @property
-    def number(self) -> int: ...  # noqa: D102
-    @property
-    def poses_at_once(self) -> int: ...  # noqa: D102
-
-    def possible(self, p: FloatArray) -> BoolArray:
-        """Return (N, number) whether each is possible at `p` (N, 3) [m] in {S}."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,66 +207,6 @@ def _roll_frames(p: FloatArray, c: FloatArray, s: FloatArray, phi: FloatArray) -
     return T
 
 
-STARTS: Final = 4
-"""Number of postures from which a search begins, those with the nearest tool points first."""
-
-SAMPLES: Final = 20_000
-"""Number of random postures from which these are taken."""
-
-EFFORT: Final = 60
-"""Maximum effort of one search, in looks."""
-
-REACHED: Final = 1e-6
-"""[m] Distance from a point up to which the tool point is there."""
-
-
-@dataclass(frozen=True, eq=False)
-class PointSearch:
-    """The search of the point alone, for an arm that chooses no orientation.
-
-    Attributes:
-        chain: the chain.
-        accepts: returns (N,) whether postures (N, n) [rad] may be taken.
-    """
-
-    chain: Chain
-    accepts: Callable[[FloatArray], BoolArray]
-
-    number: ClassVar[int] = 1
-    poses_at_once: ClassVar[int] = 64
-    """A search takes about as long as this number of poses in closed form."""
-
-    @cached_property
-    def _descent(self) -> Descent:
-        return Descent(search_of(self.chain), Regularity(self.chain.n))
-
-    @cached_property
-    def _table(self) -> tuple[FloatArray, FloatArray]:
-        """Postures (M, n) [rad] that may be taken, and their tool points (M, 3) [m]."""
-        chain = self.chain
-        q = np.random.default_rng(chain.n).uniform(chain.lower, chain.upper, (SAMPLES, chain.n))
-        q = q[self.accepts(q)]
-        return q, forward_batch(chain, q)[:, :3, 3]
-
-    def possible(self, p: FloatArray) -> BoolArray:
-        """Return (N, 1) whether the tool point can be at `p` (N, 3) [m] in {S}."""
-        return np.array([self._reaches(point) for point in p], dtype=np.bool).reshape(-1, 1)
-
-    def _reaches(self, point: FloatArray) -> bool:
-        q, points = self._table
-        if not len(q):
-            return False
-        goal = self._descent.goal(ToolTarget.of(se3.from_rotation_translation(np.eye(3), point)))
-        far = ((points - point) ** 2).sum(axis=1)
-        for start in q[np.argsort(far, kind="stable")[:STARTS]].tolist():
-            end = self._descent.run(goal, tuple(start), Priority.POSITION, EFFORT).q
-            look = self._descent.look(goal, end)
-            near = self._descent.misses(look, Priority.POSITION)[0] <= REACHED
-            if near and self.accepts(np.array([end]))[0]:
-                return True
-        return False
-
-
 GOLDEN: Final = math.pi * (3.0 - math.sqrt(5.0))
 """[rad] Golden angle, by which neighbouring directions on a sphere are turned."""
 
@@ -345,14 +265,12 @@ class Reachability:
         return links_of(self.chain, exact=False)
 
     @cached_property
-    def orientations(self) -> Orientations:
+    def orientations(self) -> PitchesAndRolls | Rotations:
         """The orientations that are tried at a point."""
         kinematics = kinematics_of(self.chain)
         solver = PoseSolver(kinematics, self.clear)
         if kinematics.is_pitched:
             return PitchesAndRolls(solver, self.pitches, self.rolls)
-        if not kinematics.is_exact and kinematics.arm_angle_joint is None:
-            return PointSearch(self.chain, self.clear)
         R = self.T_base_shoulder[:3, :3].T @ rotations(self.pitches, self.rolls)
         return Rotations(solver, R)
 
@@ -374,6 +292,23 @@ class Reachability:
         counts = np.zeros(len(points), dtype=np.int64)
         counts[near] = self.orientations.possible(p).sum(axis=1)
         return counts
+
+    def reached(self, ranges: tuple[range, range, range], size: float) -> FloatArray:
+        """Return the centres (N, 3) [m] of the voxels in which a random posture has its tool point.
+
+        ``ranges``, ``size`` [m]: see `voxel_ranges`.
+        """
+        chain, rng = self.chain, np.random.default_rng(self.chain.n)
+        first, counts = ([side.start for side in ranges], [len(side) for side in ranges])
+        is_reached = np.zeros(counts, dtype=np.bool)
+        for _ in range(SAMPLES // POSES):
+            q = rng.uniform(chain.lower, chain.upper, (POSES, chain.n))
+            p = forward_batch(chain, q[self.clear(q)])[:, :3, 3]
+            p = p @ self.T_base_shoulder[:3, :3].T + self.T_base_shoulder[:3, 3]
+            voxels = np.floor(p / size).astype(np.int64) - first
+            inside = ((voxels >= 0) & (voxels < counts)).all(axis=1)
+            is_reached[tuple(voxels[inside].T)] = True
+        return voxel_centers(ranges, size)[is_reached.ravel()]
 
     def clear(self, q: FloatArray) -> BoolArray:
         """Return (N,) whether no axis from the third on is below the table at `q` (N, n) [rad]."""
@@ -413,6 +348,9 @@ def rotations(directions: int, rolls: int) -> FloatArray:
 
 POSES: Final = 65536
 """Number of poses that are solved at once; they take 50 MB."""
+
+SAMPLES: Final = 16 * POSES
+"""Number of random postures of an arm that chooses no orientation."""
 
 MIN_VOXEL = 1e-3
 """[m] Minimum edge of a voxel: the accuracy of the arm's joints at the tool."""
@@ -488,7 +426,7 @@ class Fineness(NamedTuple):
 FAMILY: Final = Fineness(32, 36, 24, 2_000_000_000)
 CLOSED: Final = Fineness(16, 24, 6, 100_000_000)
 SEVEN_AXES: Final = Fineness(10, 12, 4, 10_000_000)
-POINTS: Final = Fineness(10, 1, 1, 200_000)
+POINTS: Final = Fineness(10, 1, 1, SAMPLES // 50)
 
 
 def reachability_map(
@@ -510,12 +448,16 @@ def reachability_map(
     if voxel is None:
         voxel = ROUND * math.ceil(arm.reach / fineness.voxels / ROUND)
     ranges = voxel_ranges(arm.middle, arm.reach, voxel, table)
-    poses = math.prod(map(len, ranges)) * arm.orientations.number
+    chooses = fineness is not POINTS
+    poses = math.prod(map(len, ranges)) * (arm.orientations.number if chooses else 1)
     if poses > fineness.poses:
         raise InputError(
             f"The map would take {poses:.2g} poses, and at most {fineness.poses:.0e} are tried for "
             f"this arm ({kinematics.method}). Choose larger voxels than {1e3 * voxel:g} mm."
         )
+    if not chooses:
+        points = arm.reached(ranges, voxel)
+        return ReachabilityMap(points, np.ones(len(points)))
     centers = voxel_centers(ranges, voxel)
     step = max(1, POSES // arm.orientations.poses_at_once)
     starts = range(0, len(centers), step)
