@@ -50,6 +50,17 @@ class Bench:
         assert error.command == request.payload[0], "the request was not refused"
         return error
 
+    def confine(self, axis: int, lower: float, upper: float) -> None:
+        """Put obstacles in the way of ``axis``, from 1, at two places [counts]."""
+        plant = self.arm.axes[axis - 1].plant
+        plant.lower, plant.upper = lower, upper
+        self.arm.touch()
+
+    def block(self, axis: int) -> None:
+        """Let ``axis``, from 1, stick where it is."""
+        position = self.arm.axes[axis - 1].plant.position
+        self.confine(axis, position, position)
+
     @property
     def states(self) -> tuple[int, ...]:
         states: tuple[int, ...] = self.ask(ReadStates()).states

@@ -182,7 +182,7 @@ def test_flush_drops_what_waits_and_freeze_stops_at_once(bench: Bench) -> None:
 
 
 def test_obstacle_stops_the_arm_until_it_is_unblocked(bench: Bench) -> None:
-    bench.arm.obstruct(1, 25000)
+    bench.confine(1, 25000, 31000)
     for axis in (1, 2):
         bench.ask(req.SetAxisParameter(axis, 3, 180, 180))
     bench.move(1, 0)
@@ -207,11 +207,11 @@ def test_gripper_that_holds_something_does_not_keep_the_arm_blocked() -> None:
     bench = Bench(EmulatedArm(calibrated=True, object_width=100.0))
     bench.move(6, 12240)
     bench.wait(4.0)
-    bench.arm.block(1)
+    bench.block(1)
     bench.move(1, 29000)
     bench.wait(2.0)
     assert bench.states == (40, 8, 8, 8, 8, 40)
-    bench.arm.release(1)
+    bench.confine(1, *bench.arm.axes[0].facts.stops)
     bench.ask(req.CommandMotor(1, req.MotorFlag.FREEZE, bench.positions[0]))
     bench.move(1, 29000)
     bench.wait(3.0)
@@ -220,7 +220,7 @@ def test_gripper_that_holds_something_does_not_keep_the_arm_blocked() -> None:
 
 
 def test_no_collision_is_found_while_detection_is_off(bench: Bench) -> None:
-    bench.arm.block(1)
+    bench.block(1)
     bench.ask(req.SetCollisionDetection(0))
     bench.move(1, 29000)
     bench.wait(3.0)

@@ -36,7 +36,7 @@ def test_axis_that_presses_with_its_whole_current_stops_the_arm() -> None:
     bench = Bench(EmulatedArm(calibrated=True))
     # No deviation counts as a collision any more.
     bench.ask(req.SetAxisParameter(1, COLLISION_LIMIT, 255, 255))
-    bench.arm.block(1)
+    bench.block(1)
     bench.move(1, 0)
     pressed = None
     for _ in range(1000):

@@ -7,7 +7,6 @@ import threading
 import time
 from argparse import Namespace
 from collections import deque
-from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -73,7 +72,6 @@ class KatanaDriver:
         url: ArmUrl,
         bounds: FloatArray,
         joints: FloatArray,
-        clock: Callable[[], float] = time.perf_counter,
         travel: Travel | None = None,
         exchange_log: ExchangeLog | None = None,
     ) -> None:
@@ -83,7 +81,6 @@ class KatanaDriver:
             url: Address of the arm.
             bounds: (2, 6) lower and upper limits of the joints and the finger joint [rad].
             joints: (6,) values of them that are reported before the first measurement [rad].
-            clock: Clock of the control loop.
             travel: Travel of the tool between two postures; None if a stop is measured without it.
             exchange_log: File of all exchanges; None for none.
 
@@ -91,10 +88,10 @@ class KatanaDriver:
         """
         EncoderMap().check_limits(*bounds[:, :JOINTS])
         self._url, self._exchange_log = url, exchange_log
-        self._clock = clock
+        self._clock = time.perf_counter
         self._machine = ArmMachine(bounds, joints, travel)
         self._link: ArmLink | None = None
-        self._heard_at = clock()
+        self._heard_at = self._clock()
         self._retry, self._retry_at = SHORTEST_RETRY, -np.inf
         self._setpoints: deque[_Setpoint] = deque(maxlen=MAX_SETPOINTS)
         self._acts: deque[ArmAct] = deque()

@@ -192,7 +192,6 @@ class EmulatedArm:
         time: simulated time since the start [s].
         detects_collisions: whether a blocked axis stops the arm.
         collided: axis that stopped the arm, from 1; 0 for none.
-        is_powered: False while the power is off.
     """
 
     def __init__(
@@ -221,7 +220,6 @@ class EmulatedArm:
         self.time = 0.0
         self.detects_collisions = True
         self.collided = 0
-        self.is_powered = True
         self.object_width = object_width
         self._scale = calibration_scale
         self._loads = loads
@@ -230,7 +228,6 @@ class EmulatedArm:
         self._done = 0
         self._steps = 0
         self._rests = False
-        self._stops: dict[int, tuple[float, float]] = {}
         self.axes[GRIPPER].plant.contact = encoder_at_gap(object_width or 0.0)
         for axis in self.axes:
             axis.is_supported = True
@@ -298,49 +295,6 @@ class EmulatedArm:
     def chosen(self, axis: int) -> tuple[EmulatedAxis, ...]:
         """Return the axis with the number ``axis``, from 1, or all for 0."""
         return self.axes if axis == 0 else (self.axes[axis - 1],)
-
-    def block(self, axis: int) -> None:
-        """Let ``axis``, from 1, stick where it is."""
-        position = self.axes[axis - 1].plant.position
-        self._set_stops(axis, position, position)
-
-    def obstruct(self, axis: int, encoder: float) -> None:
-        """Put an obstacle in the way of ``axis``, from 1, at ``encoder`` [counts]."""
-        plant = self.axes[axis - 1].plant
-        if encoder > plant.position:
-            self._set_stops(axis, plant.lower, encoder)
-        else:
-            self._set_stops(axis, encoder, plant.upper)
-
-    def release(self, axis: int) -> None:
-        """Take away what blocks or obstructs ``axis``, from 1."""
-        if axis in self._stops:
-            plant = self.axes[axis - 1].plant
-            plant.lower, plant.upper = self._stops.pop(axis)
-            self.touch()
-
-    def switch_off(self) -> None:
-        """Cut the power: the motors are off and the arm falls."""
-        self._calibration = None
-        self.is_powered = False
-        for axis in self.axes:
-            axis.turn_off()
-            axis.is_supported = False
-        self.touch()
-
-    def switch_on(self) -> None:
-        """Give power again, as a restart of the firmware: uncalibrated, with the motors off."""
-        for axis in self.axes:
-            axis.power_up()
-        self.is_powered, self.detects_collisions = True, True
-        self.collided = 0
-        self.touch()
-
-    def _set_stops(self, axis: int, lower: float, upper: float) -> None:
-        plant = self.axes[axis - 1].plant
-        self._stops.setdefault(axis, (plant.lower, plant.upper))
-        plant.lower, plant.upper = lower, upper
-        self.touch()
 
     def _steps_at_once(self) -> int:
         return max(round(self._scale), 1) if self._calibration is not None else 1

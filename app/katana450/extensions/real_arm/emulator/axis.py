@@ -241,20 +241,14 @@ class EmulatedAxis:
         # The weight under which nothing changes any more, until the axis is touched.
         self._still_under: float | None = None
         self.setpoint, self._speed, self._pressed = position, 0.0, 0.0
-        self.power_up()
-
-    def power_up(self) -> None:
-        """Begin as after power-up: motor off, encoder at zero, parameters as configured."""
-        limits = self.facts
         self.parameters = {
-            SPEED_LIMIT: (limits.speed, limits.speed, 0),
+            SPEED_LIMIT: (facts.speed, facts.speed, 0),
             ACCELERATION_LIMIT: (1, 0, 0),
-            COLLISION_LIMIT: (*divmod(limits.collision_limit, 256), 0),
-            SPLINE_COLLISION_LIMIT: (*divmod(limits.collision_limit, 256), 0),
+            COLLISION_LIMIT: (*divmod(facts.collision_limit, 256), 0),
+            SPLINE_COLLISION_LIMIT: (*divmod(facts.collision_limit, 256), 0),
         }
         self.offset = -round(self.plant.position)
         self.is_calibrated = self.is_supported = False
-        self.turn_off()
 
     @property
     def position(self) -> int:

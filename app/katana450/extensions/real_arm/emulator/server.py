@@ -127,15 +127,10 @@ class EmulatorServer:
         longest = LONGEST_SCALED_STEP if self.arm.is_calibrating else LONGEST_STEP
         self.arm.step(min(now - self._now, longest))
         self._now = now
-        if not self.arm.is_powered:
-            self._drop()
 
     def _accept(self) -> None:
         with suppress(OSError):
             client, _ = self._listening.accept()
-            if not self.arm.is_powered:
-                client.close()
-                return
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             client.settimeout(SEND_TIMEOUT)
             self._client, self._codec = client, FirmwareCodec()
