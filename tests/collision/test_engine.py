@@ -203,21 +203,6 @@ def test_triangles_are_the_surface_of_the_hull(size: float, flat: float) -> None
     assert all(edges.count(edge) == 2 for edge in edges)
 
 
-def apart(one: CollisionShape, other: CollisionShape, p: tuple[float, float, float]) -> float:
-    """Return the distance between two shapes, the second at ``p`` [m] on a joint at zero."""
-    T = se3.from_rotation_translation(np.eye(3), p)
-    linkage = Linkage([RigidGroup(0, T, np.array([0.0, 0.0, 1.0]), 0)])
-    parts = [obstacle("one", np.eye(4), one), Part("other", 1, (np.eye(4),), (other,))]
-    contact = CollisionWorld(linkage, parts, [(0, 1)]).nearest(np.zeros(1))
-    assert contact is not None
-    assert contact.parts == ("one", "other")
-    assert np.linalg.norm(contact.normal) == pytest.approx(1.0)
-    np.testing.assert_allclose(
-        contact.points[1] - contact.points[0], contact.distance * contact.normal, atol=1e-6
-    )
-    return contact.distance
-
-
 @pytest.mark.parametrize(
     "cube", [lambda: hull(CUBE), lambda: box((1.0, 1.0, 1.0))], ids=["hull", "box"]
 )
@@ -237,7 +222,7 @@ def test_distances(
     p: tuple[float, float, float],
     distance: float,
 ) -> None:
-    assert apart(cube(), other(), p) == pytest.approx(distance, abs=1e-6)
+    assert measured(cube(), HERE, other(), at(*p)).distance == pytest.approx(distance, abs=1e-6)
 
 
 @pytest.mark.parametrize("sides", [200, 400])
@@ -246,19 +231,9 @@ def test_hull_with_a_corner_of_many_edges_is_exact(sides: int) -> None:
     ring = 0.02 * np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=1)
     cone = hull(np.concatenate((ring, [[0.0, 0.0, 0.06]])))
     wall = box((1.0, 1.0, 1.0))
-    distances = [apart(wall, cone, p) for p in ((0.6, 0.0, 0.0), (0.0, -0.6, 0.0), (0.0, 0.0, 0.6))]
-    np.testing.assert_allclose(distances, (0.08, 0.08, 0.1), rtol=0.0, atol=1e-8)
-    assert apart(wall, cone, (0.0, 0.0, -0.6)) == pytest.approx(0.04, abs=1e-8)
-
-
-def test_overlapping_shapes_have_a_depth() -> None:
-    assert apart(hull(CUBE), hull(CUBE), (0.9, 0.0, 0.0)) == pytest.approx(-0.1, abs=1e-5)
-
-
-@pytest.mark.parametrize("side", [0.0, 0.7, -2.0])
-def test_half_space_is_flat_and_infinite(side: float) -> None:
-    assert apart(half_space(), hull(CUBE), (side, -side, 0.6)) == pytest.approx(0.1, abs=1e-9)
-    assert apart(half_space(), hull(CUBE), (side, 0.0, 0.45)) == pytest.approx(-0.05, abs=1e-6)
+    places = (0.6, 0.0, 0.0), (0.0, -0.6, 0.0), (0.0, 0.0, 0.6), (0.0, 0.0, -0.6)
+    distances = [measured(wall, HERE, cone, at(*place)).distance for place in places]
+    np.testing.assert_allclose(distances, (0.08, 0.08, 0.1, 0.04), rtol=0.0, atol=1e-8)
 
 
 def test_shapes_have_the_given_poses() -> None:
