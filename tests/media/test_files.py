@@ -30,7 +30,7 @@ def frames(count: int = COUNT) -> Iterator[Pixels]:
         yield picture
 
 
-def decoded(path: Path) -> tuple[Pixels, str]:
+def decoded(path: Path, size: tuple[int, int] = (WIDTH, HEIGHT)) -> tuple[Pixels, str]:
     """Return the pictures (n, height, width, 3) of a film, and ffmpeg's description of it."""
     done = subprocess.run(
         [get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
@@ -38,7 +38,7 @@ def decoded(path: Path) -> tuple[Pixels, str]:
         timeout=60,
         check=True,
     )
-    pictures = np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, HEIGHT, WIDTH, 3)
+    pictures = np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, size[1], size[0], 3)
     return pictures, done.stderr.decode()
 
 

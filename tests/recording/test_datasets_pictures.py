@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from imageio_ffmpeg import get_ffmpeg_exe
 
 from katana450.arm.robot.props import load_props
 from katana450.cli.main import main
@@ -27,7 +26,7 @@ from katana450.extensions.recording.datasets.sampling import RecordedStates
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.options import VIEWS
 from katana450.server.viser_bridge.presets import Preset
-from tests.media.test_files import HEIGHT, WIDTH, frames
+from tests.media.test_files import HEIGHT, WIDTH, decoded, frames
 from tests.recording.dataset_files import episode_folder
 from tests.recording.lerobot_check import check_dataset, episodes_of
 from tests.recording.recorded import described, swinging
@@ -35,17 +34,6 @@ from tests.recording.recorded import described, swinging
 SIZE = (64, 48)
 FPS = 5
 OWN = Path("/proc/self").exists()
-
-
-def decoded(path: Path, size: tuple[int, int]) -> npt.NDArray[np.uint8]:
-    """Return the pictures (n, height, width, 3) of a video, and check their times."""
-    done = subprocess.run(
-        [get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
-        capture_output=True,
-        timeout=60,
-        check=True,
-    )
-    return np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, size[1], size[0], 3)
 
 
 def test_video_has_the_episodes_one_after_another(tmp_path: Path) -> None:
@@ -64,7 +52,7 @@ def test_video_has_the_episodes_one_after_another(tmp_path: Path) -> None:
         {**place, "from_timestamp": 0.4, "to_timestamp": 1.1},
     ]
     path = tmp_path / "videos/observation.images.top/chunk-000/file-000.mp4"
-    shown = decoded(path, (WIDTH, HEIGHT))
+    shown, _ = decoded(path)
     assert shown.shape == (11, HEIGHT, WIDTH, 3)
     # Half of the resolution of colours is lost by the encoding, at the edges of the bar.
     assert np.abs(shown.astype(int) - np.array(pictures)).mean() < 3.0
@@ -120,7 +108,7 @@ def test_pictures_show_the_states(tmp_path: Path) -> None:
                     pictures.append(shot.taken(stage, robot, state).pixels)
     for view, pictures in expected.items():
         feature = f"observation.images.{view.lower()}"
-        shown = decoded(out / f"videos/{feature}/chunk-000/file-000.mp4", SIZE)
+        shown, _ = decoded(out / f"videos/{feature}/chunk-000/file-000.mp4", SIZE)
         assert len(shown) == info["total_frames"] == len(pictures)
         for number, picture in enumerate(pictures):
             distances = np.abs(shown.astype(int) - picture).mean(axis=(1, 2, 3))
@@ -138,7 +126,7 @@ def test_film_and_page_of_a_part(run: Path, tmp_path: Path) -> None:
     look = ("--view", "side", "--size", "64x48", "--fps", str(FPS))
     words = ["record", "export", str(run), *part]
     assert main([*words, "--format", "mp4", *look, "--out", str(film)]) == 0
-    assert decoded(film, SIZE).shape == (6, 48, 64, 3)
+    assert decoded(film, SIZE)[0].shape == (6, 48, 64, 3)
     assert main([*words, "--format", "html", "--out", str(page)]) == 0
     assert "<title>katana450: run</title>" in page.read_text(encoding="utf-8")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.html", "run.mp4"]
