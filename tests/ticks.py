@@ -1,7 +1,8 @@
-"""Ticks of a session whose arm follows its setpoint exactly."""
+"""Ticks of a session whose arm follows its setpoint exactly, and a clock for control loops."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from itertools import islice
 
@@ -11,6 +12,19 @@ from katana450.arm.control.state.state import State
 
 TICK = 0.01
 """[s]"""
+
+
+class SteppedClock:
+    """A clock that advances when a loop sleeps, and when the test sets it."""
+
+    def __init__(self, t: float = 100.0) -> None:
+        self.t = t
+
+    def now(self) -> float:
+        return self.t
+
+    def sleep_until(self, t: float, _wake: threading.Event | None = None) -> None:
+        self.t = max(self.t, t)
 
 
 def states(

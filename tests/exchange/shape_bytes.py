@@ -1,6 +1,10 @@
-"""Small shape files, of which tests replace parts."""
+"""Small shape files, of which tests replace parts, and archives of files."""
 
 from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping
 
 PLY = """ply
 format ascii 1.0
@@ -35,3 +39,12 @@ OBJ = (
     b"mtllib ../../etc/passwd\no a\nv 0 0 0 1 0 0\nv 1 0 0 \\\n 1 0 0\nv 1 1 0 1 0 0\n"
     b"f -3 -2 -1\nv 0 0 1\nvt 0 0\nvn 0 0 1\nusemtl gold\nf 1/1/1 2//1 3/1 -1 # four\r\nl 1 2\n"
 )
+
+
+def zipped(files: Mapping[str, str | bytes], folder: str = "") -> bytes:
+    """Return a .zip as other programs write it, with its files in ``folder``."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(folder + name, content)
+    return out.getvalue()

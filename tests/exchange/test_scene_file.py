@@ -32,6 +32,7 @@ from katana450.extensions.importers.formats.shape_file import Up
 from katana450.extensions.programs.script.script_scene import MeshFile, Scene, parsed
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from tests.exchange.shape_bytes import zipped
 
 T_PALM_TOOL = frozen(se3.from_rotation_translation(so3.exp((0.1, 0.2, 0.3)), (0.01, -0.02, 0.15)))
 NAMES = st.text(
@@ -174,14 +175,6 @@ def test_scene_of_a_script_is_read_with_its_meshes(mesh: Mesh, tmp_path: Path) -
         read_scene_folder(script, T_PALM_TOOL)
 
 
-def zipped(**files: bytes | str) -> bytes:
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
-            archive.writestr(name.replace("__", "/").replace("_yaml", ".yaml"), content)
-    return out.getvalue()
-
-
 MESH = """\
 scene: 1
 objects:
@@ -204,7 +197,7 @@ def test_no_path_leads_out_of_a_scene(path: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"line 3.*not a relative path|in the folder"):
         read_scene_folder(inside / "scene.yaml", None)
     with pytest.raises(InputError, match="not a relative path"):
-        read_scene_zip(zipped(scene_yaml=MESH.format(file=path)), None)
+        read_scene_zip(zipped({"scene.yaml": MESH.format(file=path)}), None)
 
 
 def test_a_link_out_of_the_folder_is_not_followed(tmp_path: Path) -> None:
@@ -252,7 +245,7 @@ THINGS = "scene: 1\nobjects:\n"
 )
 def test_error_is_reported_with_its_line(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        read_scene_zip(zipped(scene_yaml=text), None)
+        read_scene_zip(zipped({"scene.yaml": text}), None)
 
 
 def test_a_mesh_file_that_has_changed_is_refused(mesh: Mesh) -> None:
@@ -280,15 +273,15 @@ def test_a_corrupt_or_too_large_zip_is_refused(mesh: Mesh, monkeypatch: pytest.M
         except InputError:
             continue
     monkeypatch.setattr(archive, "MAX_ARCHIVE_BYTES", 100_000)
-    bomb = zipped(scene_yaml=MESH.format(file="zeros.stl"), **{"zeros.stl": bytes(1_000_000)})
+    bomb = zipped({"scene.yaml": MESH.format(file="zeros.stl"), "zeros.stl": bytes(1_000_000)})
     assert len(bomb) < 5000
     with pytest.raises(InputError, match="MB when unpacked"):
         read_scene_zip(bomb, None)
-    many = zipped(**{f"f{i}": b"" for i in range(scene_file.MAX_FILES + 1)})
+    many = zipped({f"f{i}": b"" for i in range(scene_file.MAX_FILES + 1)})
     with pytest.raises(InputError, match="more than 64 files"):
         read_scene_zip(many, None)
     with pytest.raises(InputError, match=r"no file scene\.yaml"):
-        read_scene_zip(zipped(other=b""), None)
+        read_scene_zip(zipped({"other": b""}), None)
 
 
 def made(key: str, size: int) -> Mesh:

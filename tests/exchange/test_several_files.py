@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from katana450.extensions.importers.formats.shape_file import Format, read_shape
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.extensions.programs.script.script_scene import Scene
 from tests.exchange.compressed_gltf import DATA, SQUARE
+from tests.exchange.shape_bytes import zipped
 
 ROBOT = f'{HEADER}\nInline {{ url "parts/arm.wrl" }} Inline {{ url "parts/tool/grip.wrl" }}'
 
@@ -40,15 +41,6 @@ PARTS = {
 }
 
 ARTICULATED = {"robot.wrl": ROBOT} | PARTS
-
-
-def zipped(files: Mapping[str, str | bytes], folder: str = "") -> bytes:
-    """Return a .zip as other programs write it, with its files in ``folder``."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
-            archive.writestr(folder + name, content)
-    return out.getvalue()
 
 
 def written(folder: Path, files: dict[str, str]) -> Path:

@@ -23,6 +23,7 @@ from katana450.extensions.importers.formats.shape_file import (
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.platform_support import hanging_time
 from tests.exchange.mutations import check_mutations
+from tests.exchange.shape_bytes import zipped
 from tests.exchange.solids import is_closed, sides, volume
 
 FOREIGN = Path(__file__).parent / "foreign"
@@ -45,11 +46,7 @@ def threemf(
     )
     triangles = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*row) for row in shape.faces)
     model = MODEL.format(unit=unit, vertices=vertices, triangles=triangles, more=more)
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in ({"3D/3dmodel.model": model.encode()} | (files or {})).items():
-            archive.writestr(name, content)
-    return out.getvalue()
+    return zipped({"3D/3dmodel.model": model.encode()} | (files or {}))
 
 
 def test_components_units_and_transforms_of_3mf() -> None:

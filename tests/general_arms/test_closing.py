@@ -29,8 +29,8 @@ from tests.general_arms.published_hands import (
     so101_urdf,
 )
 from tests.general_arms.test_grasping import item, planned
+from tests.ticks import until_rest
 
-TICK = 0.01
 CLOSED = cmd.Gripper(-0.174533)
 BOX = (25.0, 20.0, 50.0)
 """[mm] Size of the part between the jaws of an SO-101."""
@@ -52,19 +52,6 @@ def before(plan: Planned) -> State:
     return replace(states[last], mode=IDLE, goal=states[last].setpoint, outcomes=())
 
 
-def run(session: Session, state: State, *commands: cmd.Command, ticks: int = 600) -> list[State]:
-    """Return the states from ``commands`` to rest, at most ``ticks``."""
-    states = []
-    for _ in range(ticks):
-        state = session.step(state, commands, state.t + TICK)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-        states.append(state)
-        commands = ()
-        if not state.moving:
-            break
-    return states
-
-
 def gaps(session: Session, state: State, part: SceneObject) -> tuple[float, float]:
     """Return the distances [m] of both jaws from ``part``, which stands."""
     world = session.environment.world([part])
@@ -78,7 +65,7 @@ def gaps(session: Session, state: State, part: SceneObject) -> tuple[float, floa
 def test_one_jaw_pushes_the_part_and_takes_it_between_two_faces(
     plan: Planned, before: State
 ) -> None:
-    states = run(plan.session, before, CLOSED)
+    states = until_rest(plan.session, before, CLOSED)
     assert states[-1].held is not None
     assert states[-1].status.value == "ok"
     first = next(n for n, state in enumerate(states) if state.held is not None)
@@ -96,26 +83,26 @@ def test_one_jaw_pushes_the_part_and_takes_it_between_two_faces(
 
 def test_stop_ends_the_push_and_the_part_stays(plan: Planned, before: State) -> None:
     start = before.objects[0].T
-    states = run(plan.session, before, CLOSED)
+    states = until_rest(plan.session, before, CLOSED)
     under_way = next(
         state
         for state in states
         if state.held is None and np.linalg.norm(state.objects[0].T[:2, 3] - start[:2, 3]) > 1.5e-3
     )
-    stopped = run(plan.session, under_way, cmd.Stop())[-1]
+    stopped = until_rest(plan.session, under_way, cmd.Stop())[-1]
     assert stopped.stopped is not None
     assert stopped.held is None
     # It has the speed of the jaw, 0.1 m/s, and slides on by 1 mm.
     ends = stopped.objects[0].T[:3, 3], under_way.objects[0].T[:3, 3]
     np.testing.assert_allclose(*ends, rtol=0, atol=3e-3)
-    ignored = run(plan.session, stopped, CLOSED)[-1]
+    ignored = until_rest(plan.session, stopped, CLOSED)[-1]
     assert ignored.gripper_setpoint == stopped.gripper_setpoint
     ends = ignored.objects[0].T[:3, 3], stopped.objects[0].T[:3, 3]
     np.testing.assert_allclose(*ends, rtol=0, atol=1e-3)
     # A stop cannot be cleared at once.
     later = replace(stopped, t=stopped.t + 2.0)
-    again = run(plan.session, later, cmd.ClearStop())[-1]
-    assert run(plan.session, again, CLOSED)[-1].held is not None
+    again = until_rest(plan.session, later, cmd.ClearStop())[-1]
+    assert until_rest(plan.session, again, CLOSED)[-1].held is not None
 
 
 def test_part_is_pushed_on_the_object_that_carries_it(plan: Planned, before: State) -> None:
@@ -124,7 +111,7 @@ def test_part_is_pushed_on_the_object_that_carries_it(plan: Planned, before: Sta
     T = T.copy()
     T[2, 3] = support.height
     stack = replace(before.objects[0], T=T), support
-    closed = run(plan.session, replace(before, objects=stack), CLOSED)[-1]
+    closed = until_rest(plan.session, replace(before, objects=stack), CLOSED)[-1]
     assert closed.held is not None
     assert closed.held.name == "part"
     assert not closed.findings
@@ -134,9 +121,9 @@ def test_part_is_pushed_on_the_object_that_carries_it(plan: Planned, before: Sta
 
 
 def test_opened_jaw_leaves_the_part_standing(plan: Planned, before: State) -> None:
-    held = run(plan.session, before, CLOSED)[-1]
+    held = until_rest(plan.session, before, CLOSED)[-1]
     assert held.grip is not None
-    free = run(plan.session, held, cmd.Gripper(1.7))[-1]
+    free = until_rest(plan.session, held, cmd.Gripper(1.7))[-1]
     assert free.held is None
     assert free.grip is None
     assert abs(free.objects[0].T[2, 3]) < 1e-3
@@ -167,13 +154,13 @@ def test_hand_with_one_moving_link_holds_nothing(tmp_path: Path) -> None:
     assert hand is not None
     assert hand.sides == (("hook",),)
     start = session.begin(session.ready, 0.0, 0.0)
-    (*_, opened) = run(session, start, cmd.Gripper(0.12))
+    (*_, opened) = until_rest(session, start, cmd.Gripper(0.12))
     palm = hand.T_palm_tool @ se3.from_rotation_translation(np.eye(3), (0.09, 0.0, -0.025))
     T = session.environment.pose(
         SceneObject("part", Shape.BOX, (0.02, 0.02, 0.05), palm, fixed=True), opened.x_setpoint
     )
     part = SceneObject("part", Shape.BOX, (0.02, 0.02, 0.05), T, can_be_held=True)
-    (*_, closed) = run(session, replace(opened, objects=(part,)), cmd.Gripper(0.05))
+    (*_, closed) = until_rest(session, replace(opened, objects=(part,)), cmd.Gripper(0.05))
     assert closed.held is None
     assert closed.grip is None
     (contact,) = closed.findings

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -35,6 +34,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
+from tests.ticks import SteppedClock
 
 Commands = Callable[[np.random.Generator, State, DescribedRobot], Iterator[cmd.Command]]
 """The commands of the next tick, by the state before it."""
@@ -60,21 +60,6 @@ def described() -> DescribedRobot:
 def fresh() -> DescribedRobot:
     """Return the shipped robot with a session that has computed nothing yet."""
     return describe_robot(Settings(), URDF_PATH, None)
-
-
-class TestClock:
-    """A clock that the test sets."""
-
-    __test__ = False
-
-    def __init__(self, t: float) -> None:
-        self.t = t
-
-    def now(self) -> float:
-        return self.t
-
-    def sleep_until(self, t: float, _wake: threading.Event | None = None) -> None:
-        self.t = max(self.t, t)
 
 
 class OddDriver(SimulatedDriver):
@@ -152,13 +137,21 @@ def run(
     *,
     odd: bool = True,
     driver: Driver | None = None,
+    robot: DescribedRobot | None = None,
 ) -> ControlLoop:
     """Run the control loop for ``ticks`` with random commands; ``take`` gets every record.
 
-    ``odd``: whether its driver sometimes answers otherwise, or fails. ``driver``: another one.
+    Args:
+        ticks: the number of ticks.
+        seed: of the random numbers.
+        take: gets the record of each tick.
+        commands: the commands of each tick.
+        odd: whether the driver sometimes answers otherwise, or fails.
+        driver: another driver.
+        robot: another robot than the shipped one.
     """
-    katana = described()
-    rng, clock = np.random.default_rng(seed), TestClock(1000.0)
+    katana = robot or described()
+    rng, clock = np.random.default_rng(seed), SteppedClock(1000.0)
     mailbox = Mailbox(katana.session.check)
     if driver is None:
         kind = OddDriver if odd else SimulatedDriver
@@ -190,10 +183,12 @@ def dragging(
         )
 
 
-def header(*attachments: Attachment) -> RecordingHeader:
-    """Return the header of a recording of the shipped arm."""
-    katana = described()
-    head = header_of(katana.robot, Settings(), URDF_PATH, None, katana.session.environment)
+def header(
+    *attachments: Attachment, robot: DescribedRobot | None = None, urdf: Path = URDF_PATH
+) -> RecordingHeader:
+    """Return the header of a recording of the shipped arm, or of another ``robot`` of ``urdf``."""
+    katana = robot or described()
+    head = header_of(katana.robot, Settings(), urdf, None, katana.session.environment)
     return replace(head, attachments=(*head.attachments, *attachments))
 
 

@@ -10,12 +10,14 @@ import numpy as np
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.state import State
 from katana450.arm.drivers.driver import Driver
+from katana450.assembly.robot_session import DescribedRobot
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.resources import URDF_PATH
 from tests.recording.recorded import PERIOD, described, header, run
 
 Commands = Callable[[int, State], Iterator[cmd.Command]]
@@ -23,15 +25,21 @@ Commands = Callable[[int, State], Iterator[cmd.Command]]
 
 
 def record_session(
-    path: Path, ticks: int, commands: Commands, driver: Driver | None = None
+    path: Path,
+    ticks: int,
+    commands: Commands,
+    driver: Driver | None = None,
+    robot: DescribedRobot | None = None,
+    urdf: Path = URDF_PATH,
 ) -> Path:
     """Write a session of ``ticks`` ticks with ``commands`` to ``path``, and return it.
 
-    ``driver``: the arm, at the ready posture; None for one that follows exactly.
+    ``driver``: the arm, at the ready posture; None for one that follows exactly. ``robot``:
+    another one than the shipped one, of the description ``urdf``.
     """
     count = iter(range(ticks))
     with path.open("wb") as file:
-        writer = RecordingWriter(file, header())
+        writer = RecordingWriter(file, header(robot=robot, urdf=urdf))
         run(
             ticks,
             1,
@@ -39,6 +47,7 @@ def record_session(
             lambda _rng, state, _found: commands(next(count), state),
             odd=False,
             driver=driver,
+            robot=robot,
         )
         writer.close()
     return path

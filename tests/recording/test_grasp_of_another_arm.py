@@ -23,7 +23,8 @@ from katana450.extensions.recording.files.recording_writer import RecordingWrite
 from katana450.settings import Settings
 from tests.general_arms.gripping_arms import gripping_urdf
 from tests.general_arms.published_hands import closing_upwards, px150_urdf, so101_urdf
-from tests.recording.recorded import ADA, PERIOD, TestClock
+from tests.recording.recorded import ADA, PERIOD
+from tests.ticks import SteppedClock
 
 SCRIPT = """frame: base
 scene:
@@ -53,7 +54,7 @@ def test_recording_is_verified_and_scored(name: str, tmp_path: Path) -> None:
     robot, session, _ = find_robot(Settings(), urdf, None)
     script = parse(SCRIPT)
     assert script.scene is not None
-    clock, mailbox = TestClock(100.0), Mailbox(session.check)
+    clock, mailbox = SteppedClock(100.0), Mailbox(session.check)
     driver = SimulatedDriver(robot.require_arm(), session.ready, 0.0)
     loop = ControlLoop(session, driver, mailbox, clock, 1.0 / PERIOD)
     start = script.scene.begin(session)

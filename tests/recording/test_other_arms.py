@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +15,18 @@ from rosbags.typesys import Stores, get_typestore
 
 import katana450
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.drivers.simulated import SimulatedDriver
-from katana450.arm.runtime.loop import ControlLoop
-from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.control.state.state import State
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.cli.main import main
 from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.recording.files.header import header_of
-from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.settings import Settings
 from tests.general_arms.links_of_arms import ur5e
 from tests.recording.lerobot_check import check_dataset, rows_of
-from tests.recording.recorded import ADA, PERIOD, TestClock
+from tests.recording.recorded import PERIOD
+from tests.recording.sessions import record_session
 
 TOLERANCE = 1.5e-4
 """[rad] Distance of a run from the recorded setpoints, as in ``test_run_again``."""
@@ -49,24 +47,16 @@ def described(urdf: Path) -> DescribedRobot:
 @pytest.fixture(scope="module")
 def path(urdf: Path, described: DescribedRobot) -> Path:
     """Two typed places of the tool, one after the other, and a stop."""
-    session, clock = described.session, TestClock(100.0)
-    arm, mailbox = session.require_arm(), Mailbox(session.check)
-    driver = SimulatedDriver(described.robot.require_arm(), session.ready, 0.0)
-    loop = ControlLoop(session, driver, mailbox, clock, 1.0 / PERIOD)
-    p = forward(arm.chain, session.ready)[:3, 3]
+    session = described.session
+    p = forward(session.require_arm().chain, session.ready)[:3, 3]
     drags = {5: p + np.array((0.0, 0.05, -0.05)), 120: p - np.array((0.0, 0.05, 0.0))}
+
+    def commands(tick: int, _state: State) -> Iterator[cmd.Command]:
+        if tick in drags:
+            yield cmd.Position(drags[tick])
+
     recorded = urdf.with_name("run.mcap")
-    head = header_of(described.robot, Settings(), urdf, None, session.environment)
-    with recorded.open("wb") as file:
-        writer = RecordingWriter(file, head)
-        loop.record = writer.put
-        for tick in range(260):
-            clock.t += PERIOD
-            if tick in drags:
-                mailbox.put(cmd.Position(drags[tick]), ADA)
-            loop.tick()
-        writer.close()
-    return recorded
+    return record_session(recorded, 260, commands, robot=described, urdf=urdf)
 
 
 def test_states_have_all_axes_and_the_tool(path: Path, described: DescribedRobot) -> None:

@@ -31,21 +31,9 @@ from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
+from tests.ticks import SteppedClock
 
 RATE = 100.0
-
-
-class SteppedClock:
-    """A clock that advances when the loop sleeps, and when the test sets it."""
-
-    def __init__(self) -> None:
-        self.t = 100.0
-
-    def now(self) -> float:
-        return self.t
-
-    def sleep_until(self, t: float, _wake: threading.Event | None = None) -> None:
-        self.t = max(self.t, t)
 
 
 class LoopParts:
