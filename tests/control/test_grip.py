@@ -70,16 +70,20 @@ def before_cup(
     return best
 
 
+def around_cup(session: Session, arm: MountedArm, state: State, offset: float = 0.0) -> State:
+    """Return the state with the open fingers round the cup, ``offset`` [m] off its middle."""
+    state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
+    for back in (BEFORE, AT):
+        q = before_cup(session, arm, state, back, offset)
+        plan = plan_to(arm, session.world_at(state), state, q)
+        state = rested(session, state, cmd.Follow(plan))
+    return state
+
+
 @pytest.fixture(scope="module")
 def holding(session: Session, arm: MountedArm) -> State:
     """The state with the cup between the fingers, on the table."""
-    state = session.begin(session.ready, 0.0, 0.0)
-    state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
-    before = before_cup(session, arm, state, BEFORE)
-    state = rested(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, before)))
-    grasp = before_cup(session, arm, state, AT)
-    state = rested(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, grasp)))
-    np.testing.assert_allclose(state.q, grasp, rtol=0, atol=1e-9)
+    state = around_cup(session, arm, session.begin(session.ready, 0.0, 0.0))
     return rested(session, state, cmd.Gripper(-0.44))
 
 
@@ -169,20 +173,10 @@ def test_opened_fingers_leave_the_cup_on_the_table(
     np.testing.assert_allclose(away.q, back, rtol=0, atol=1e-9)
 
 
-def aside(session: Session, arm: MountedArm, state: State) -> State:
-    """Return the state with the open fingers round the cup, 8 mm off its middle."""
-    state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
-    for back in (BEFORE, AT):
-        q = before_cup(session, arm, state, back, offset=0.008)
-        plan = plan_to(arm, session.world_at(state), state, q)
-        state = rested(session, state, cmd.Follow(plan))
-    return state
-
-
 def test_first_finger_pushes_the_cup_to_the_second(
     session: Session, state: State, arm: MountedArm
 ) -> None:
-    before = aside(session, arm, state)
+    before = around_cup(session, arm, state, 0.008)
     held = rested(session, before, cmd.Gripper(-0.44))
     assert cup_of(session, held)[0].held
     pushed = cup_of(session, held)[1][:3, 3] - cup_of(session, before)[1][:3, 3]
@@ -192,7 +186,7 @@ def test_first_finger_pushes_the_cup_to_the_second(
 def test_one_finger_stops_at_what_it_cannot_push_and_is_reported(
     session: Session, state: State, arm: MountedArm
 ) -> None:
-    state = aside(session, arm, state)
+    state = around_cup(session, arm, state, 0.008)
     # In place of the cup a board of 5.6 kg, whose friction on the table is 19 N.
     T = cup_of(session, state)[1]
     R = so3.rotation_z(float(np.arctan2(T[1, 3], T[0, 3])))

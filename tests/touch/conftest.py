@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import DescribedRobot, describe_robot
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
-from tests.control.test_grip import AT, BEFORE, OPEN, before_cup
+from tests.control.test_grip import OPEN, around_cup
 from tests.ticks import rested
 
 
@@ -37,13 +34,7 @@ def arm(described: DescribedRobot) -> MountedArm:
 @pytest.fixture(scope="session")
 def around(session: Session, arm: MountedArm) -> State:
     """The state with open fingers around the cup, on the table."""
-    state = session.begin(session.ready, 0.0, 0.0)
-    commands: tuple[Any, ...] = (cmd.Gripper(OPEN), cmd.Tool("grasp"))
-    state = rested(session, state, *commands)
-    for back in (BEFORE, AT):
-        q = before_cup(session, arm, state, back)
-        plan = plan_to(arm, session.world_at(state), state, q)
-        state = rested(session, state, cmd.Follow(plan))
+    state = around_cup(session, arm, session.begin(session.ready, 0.0, 0.0))
     assert np.isclose(state.gripper, OPEN)
     return state
 
