@@ -145,18 +145,6 @@ def test_server_drives_stops_and_ends_while_the_disk_is_stuck(tmp_path: Path) ->
 
 
 @pytest.mark.long
-def test_server_runs_where_the_log_cannot_be(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("no folder")
-    with (
-        AppServer((*APP, "--log", str(tmp_path / "file" / "log"))) as server,
-        connect(server.url, "Anna") as arm,
-    ):
-        arm.ask(requests.Stop())
-        assert server.output.count("cannot be written") == 1
-        assert "Not a directory" in server.output
-
-
-@pytest.mark.long
 def test_option_no_log_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     with AppServer((*APP, "--no-log")) as server:

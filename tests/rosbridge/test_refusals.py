@@ -45,106 +45,81 @@ TEXTS = {
     "too large": (json.dumps({"op": "x" * MAX_OP_BYTES}), "at most 320 KB"),
 }
 
+
+def op(name: str, **fields: Any) -> dict[str, Any]:
+    return {"op": name, **fields}
+
+
+def moved_by(**parts: Any) -> dict[str, Any]:
+    """Return a message of MoveIt Servo that moves the tool."""
+    return op("publish", topic=TWIST, msg=parts)
+
+
+def jogged(*names: str, **lists: Any) -> dict[str, Any]:
+    """Return a message of MoveIt Servo that moves joints."""
+    return op("publish", topic=JOINT_JOG, msg={"joint_names": list(names), **lists})
+
+
+def followed(**fields: Any) -> dict[str, Any]:
+    return op("send_action_goal", action=FOLLOW, **fields)
+
+
+TOLERANCE = trajectory((1.0, HOME), path_tolerance=[{"name": "axis_1", "position": 0.1}])
+
+OLD = {**twist(vx=0.1), "header": {"stamp": {"sec": 1_600_000_000}}}
+
+STATES = "sensor_msgs/JointState"
+
 OPS: dict[str, tuple[dict[str, Any], str]] = {
-    "unknown topic": ({"op": "subscribe", "topic": "/camera"}, "/camera does not exist"),
-    "topic of commands": ({"op": "subscribe", "topic": TWIST}, "only for commands"),
+    "unknown topic": (op("subscribe", topic="/camera"), "/camera does not exist"),
+    "topic of commands": (op("subscribe", topic=TWIST), "only for commands"),
     "wrong type of a topic": (
-        {"op": "subscribe", "topic": "/tf", "type": "std_msgs/String"},
+        op("subscribe", topic="/tf", type="std_msgs/String"),
         "are tf2_msgs/msg/TFMessage, not std_msgs/String",
     ),
-    "compression": ({"op": "subscribe", "topic": "/tf", "compression": "cbor"}, "'cbor'"),
-    "fragments": ({"op": "subscribe", "topic": "/tf", "fragment_size": 100}, "fragment_size"),
-    "no subscription": ({"op": "unsubscribe", "topic": "/tf"}, "no subscription"),
+    "compression": (op("subscribe", topic="/tf", compression="cbor"), "'cbor'"),
+    "fragments": (op("subscribe", topic="/tf", fragment_size=100), "fragment_size"),
+    "no subscription": (op("unsubscribe", topic="/tf"), "no subscription"),
     "advertised by the server": (
-        {"op": "advertise", "topic": "/joint_states", "type": "sensor_msgs/JointState"},
+        op("advertise", topic="/joint_states", type=STATES),
         "published by the server",
     ),
-    "advertised unknown": ({"op": "advertise", "topic": "/a", "type": "a/b"}, "/a is unknown"),
+    "advertised unknown": (op("advertise", topic="/a", type="a/b"), "/a is unknown"),
     "advertised with a wrong type": (
-        {"op": "advertise", "topic": TWIST, "type": "geometry_msgs/Twist"},
+        op("advertise", topic=TWIST, type="geometry_msgs/Twist"),
         "are geometry_msgs/msg/TwistStamped, not geometry_msgs/Twist",
     ),
-    "unadvertised unknown": ({"op": "unadvertise", "topic": "/a"}, "/a is unknown"),
-    "published unknown": ({"op": "publish", "topic": "/cmd_vel", "msg": {}}, "is unknown"),
-    "unknown service": ({"op": "call_service", "service": "/dance"}, "no service /dance"),
+    "unadvertised unknown": (op("unadvertise", topic="/a"), "/a is unknown"),
+    "published unknown": (op("publish", topic="/cmd_vel", msg={}), "is unknown"),
+    "unknown service": (op("call_service", service="/dance"), "no service /dance"),
     "arguments of a trigger": (
-        {"op": "call_service", "service": "/hold", "args": {"hard": True}},
+        op("call_service", service="/hold", args={"hard": True}),
         "unknown field `hard`",
     ),
-    "unknown action": ({"op": "send_action_goal", "action": "/fly"}, "no action /fly"),
-    "wrong type of an action": (
-        {"op": "send_action_goal", "action": FOLLOW, "action_type": "a/b"},
-        "FollowJointTrajectory, not a/b",
-    ),
-    "goal of another type": (
-        {"op": "send_action_goal", "action": FOLLOW, "args": {"order": 5}},
-        "unknown field `order`",
-    ),
-    "tolerance of a joint": (
-        {
-            "op": "send_action_goal",
-            "action": FOLLOW,
-            "args": trajectory((1.0, HOME), path_tolerance=[{"name": "axis_1", "position": 0.1}]),
-        },
-        "path_tolerance",
-    ),
+    "unknown action": (op("send_action_goal", action="/fly"), "no action /fly"),
+    "wrong type of an action": (followed(action_type="a/b"), "FollowJointTrajectory, not a/b"),
+    "goal of another type": (followed(args={"order": 5}), "unknown field `order`"),
+    "tolerance of a joint": (followed(args=TOLERANCE), "path_tolerance"),
     "goal of the fingers": (
-        {"op": "send_action_goal", "action": GRIPPER, "args": {"command": {"position": "open"}}},
+        op("send_action_goal", action=GRIPPER, args={"command": {"position": "open"}}),
         "Expected `float`",
     ),
-    "no goal": ({"op": "cancel_action_goal", "action": FOLLOW}, "There is no goal"),
-    "Twist without a header": (
-        {"op": "publish", "topic": TWIST, "msg": {"linear": {"x": 0.1}}},
-        "unknown field `linear`",
-    ),
-    "no number": (
-        {"op": "publish", "topic": TWIST, "msg": {"twist": {"linear": {"x": "fast"}}}},
-        "Expected `float`",
-    ),
-    "too fast": ({"op": "publish", "topic": TWIST, "msg": twist(vx=1.5)}, "from -1 to 1"),
-    "turning too fast": ({"op": "publish", "topic": TWIST, "msg": twist(wx=-2)}, "`angular.x`"),
-    "no axis": ({"op": "publish", "topic": TWIST, "msg": twist("tcp", wz=0.3)}, "five axes"),
-    "no frame": ({"op": "publish", "topic": TWIST, "msg": twist("map", vx=0.1)}, "no frame 'map'"),
-    "old": (
-        {
-            "op": "publish",
-            "topic": TWIST,
-            "msg": {**twist(vx=0.1), "header": {"stamp": {"sec": 1_600_000_000}}},
-        },
-        "leave its stamp zero",
-    ),
+    "no goal": (op("cancel_action_goal", action=FOLLOW), "There is no goal"),
+    "Twist without a header": (moved_by(linear={"x": 0.1}), "unknown field `linear`"),
+    "no number": (moved_by(twist={"linear": {"x": "fast"}}), "Expected `float`"),
+    "too fast": (moved_by(**twist(vx=1.5)), "from -1 to 1"),
+    "turning too fast": (moved_by(**twist(wx=-2)), "`angular.x`"),
+    "no axis": (moved_by(**twist("tcp", wz=0.3)), "five axes"),
+    "no frame": (moved_by(**twist("map", vx=0.1)), "no frame 'map'"),
+    "old": (moved_by(**OLD), "leave its stamp zero"),
     "unknown joint": (
-        {"op": "publish", "topic": JOINT_JOG, "msg": {"joint_names": ["a"], "velocities": [0.1]}},
+        jogged("a", velocities=[0.1]),
         "There is no joint 'a'. The joints are axis_1",
     ),
-    "repeated joint": (
-        {
-            "op": "publish",
-            "topic": JOINT_JOG,
-            "msg": {"joint_names": ["axis_1"] * 2, "velocities": [0.1, 0.1]},
-        },
-        "named twice",
-    ),
-    "no velocity": (
-        {"op": "publish", "topic": JOINT_JOG, "msg": {"joint_names": ["axis_1"]}},
-        "1 names of joints and 0 velocities",
-    ),
-    "displacement": (
-        {
-            "op": "publish",
-            "topic": JOINT_JOG,
-            "msg": {"joint_names": ["axis_1"], "velocities": [0.1], "displacements": [0.1]},
-        },
-        "not supported",
-    ),
-    "joint too fast": (
-        {
-            "op": "publish",
-            "topic": JOINT_JOG,
-            "msg": {"joint_names": ["axis_1"], "velocities": [3.0]},
-        },
-        "The velocity of axis_1 is 3",
-    ),
+    "repeated joint": (jogged("axis_1", "axis_1", velocities=[0.1, 0.1]), "named twice"),
+    "no velocity": (jogged("axis_1"), "1 names of joints and 0 velocities"),
+    "displacement": (jogged("axis_1", velocities=[0.1], displacements=[0.1]), "not supported"),
+    "joint too fast": (jogged("axis_1", velocities=[3.0]), "The velocity of axis_1 is 3"),
 }
 
 GOALS: dict[str, tuple[dict[str, Any], int, str]] = {
