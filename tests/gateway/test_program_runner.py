@@ -11,7 +11,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from katana450.arm.control.actor import CommandChannel, Grounds
+from katana450.arm.control.actor import Grounds
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session.session import Session
@@ -28,7 +28,7 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Participant, actor_of
+from katana450.server.service.participants import Participant
 from katana450.server.service.people import Connection
 from tests.gateway.test_hub import PAGES, Table
 from tests.waiting import until
@@ -84,21 +84,6 @@ class Staged(Table):
 @pytest.fixture
 def table(session: Session) -> Staged:
     return Staged(session)
-
-
-def test_program_holds_the_lease_under_its_own_name(table: Staged) -> None:
-    participant = table.driver()
-    table.plan(participant)
-    assert table.status == "ready"
-    table.programs.steer(participant, ProgramOrder.RUN)
-    holder = table.hub.lease.holder
-    assert holder is not None
-    assert (holder.name, holder.role) == ("Wave", Role.OPERATOR)
-    table.wait(1.0, participant)
-    assert table.hub.lease.holder == holder
-    assert any(isinstance(command, cmd.Speed) for command in table.arm.commands)
-    with pytest.raises(LeaseError, match="Wave holds the arm"):
-        table.touch(participant.person.key)
 
 
 def test_program_time_passes_while_the_state_is_unchanged(table: Staged) -> None:
@@ -284,17 +269,6 @@ def test_unattended_program_is_shown_with_its_owner_and_begin(table: Staged) -> 
     table.programs.steer(owner, ProgramOrder.END)
     progress = table.progress
     assert not progress.unattended
-
-
-def test_any_stop_ends_an_unattended_program(table: Staged) -> None:
-    owner = table.join(PAGES[0])
-    run(table, owner)
-    table.hub.leave(owner, for_good=True)
-    table.hub.stop(actor_of(Identity("anybody", "Vera", Role.VIEWER, "Vera"), CommandChannel.PAGE))
-    assert table.arm.stopped
-    table.wait(0.1)
-    assert table.status == "stopped"
-    assert table.hub.lease.holder is None
 
 
 def test_window_of_the_absent_owner_or_an_admin_ends_it(table: Staged) -> None:
