@@ -83,9 +83,3 @@ def table(page: ViserPage, name: str) -> dict[str, Any]:
     assert file.suggested_filename == f"katana450-{name}.csv"
     heading, *rows = csv.reader(io.StringIO(Path(file.path()).read_text(encoding="utf-8")))
     return dict(zip(heading, np.array(rows, float).T, strict=True))
-
-
-def reload(page: ViserPage) -> None:
-    """Reload the page. The instruments open again as before."""
-    page.page.reload()
-    page.page.wait_for_selector("#instruments .card")

@@ -13,7 +13,7 @@ from katana450.server.api import answers, requests
 from tests.browser.instruments import card, dial, goal, middle, show, slowly, table, turn
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import Truth, bar, clear_stop
+from tests.browser.session import Truth, bar
 
 SIZES = {"phone": (390, 844), "tablet": (820, 1180), "desk": (1440, 900)}
 
@@ -116,29 +116,6 @@ def test_knob_of_a_spectator_springs_back_with_the_reason(
         )
         truth.wait(10.0, mood="ok")
         other.ask(requests.ReleaseLease())
-
-
-@pytest.mark.long
-def test_stop_key_works_on_a_knob(page: ViserPage, truth: Truth) -> None:
-    pause = page.page.locator("#instruments .toolbar").get_by_role("button", name="Pause")
-    with slowly(page, truth):
-        turn(page, "axis-1", -60.0)
-        desired = goal(page, "axis-1")
-        dial(page, "axis-1").focus()
-        truth.wait(mood="moving")
-        page.page.keyboard.press("Space")
-        truth.wait(2.0, mood="stopped")
-        page.page.keyboard.press("PageUp")
-        page.wait_until(lambda: bar(page, "toast").startswith("The arm is stopped"), "why not")
-        truth.wait(5.0, moving=False)
-        rests = math.degrees(truth.status()["q"][0])
-        assert rests > desired + 5.0
-        page.wait_until(lambda: goal(page, "axis-1") == pytest.approx(rests, abs=0.1), "the knob")
-        # Also with the focus on a button, which is not pressed by the key.
-        pause.focus()
-        page.page.keyboard.press("Space")
-        assert pause.get_attribute("aria-pressed") == "false"
-        clear_stop(page, truth)
 
 
 @pytest.mark.long

@@ -13,6 +13,7 @@ import pytest
 
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import taught
+from tests.browser.instruments import dial, show
 from tests.browser.page import ViserPage
 from tests.browser.session import Truth, bar, clear_stop, go_home, mood, prepare
 from tests.browser.teach_sheet import (
@@ -281,6 +282,10 @@ def test_space_stops_the_arm_from_everything_but_a_text(sheet: ViserPage, truth:
     stops("a slider")
     page.focus("#jog-button")
     stops("a button")
+    show(sheet, True)
+    dial(sheet, "axis-1").focus()
+    stops("a knob")
+    show(sheet, False)
     assert not page.locator("#jog").is_visible()
     name = page.locator("#teach").get_by_label("Name", exact=True)
     name.fill("")

@@ -15,8 +15,6 @@ from PIL import Image
 
 from katana450.cli.main import main
 
-ROOT = Path(__file__).resolve().parents[2]
-
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory: pytest.TempPathFactory) -> Path:

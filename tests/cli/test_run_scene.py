@@ -14,8 +14,6 @@ from katana450.cli.main import main
 from tests.browser.server import AppServer, free_port
 from tests.commands import completed
 
-ROOT = Path(__file__).resolve().parents[2]
-
 SCRIPT = """\
 frame: base
 tool: tcp

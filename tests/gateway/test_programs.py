@@ -7,7 +7,6 @@ import json
 import secrets
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from tests.gateway.client import Control
 from tests.gateway.postures import FAR
 from tests.gateway.virtual import VirtualServer
 
-ROOT = Path(__file__).resolve().parents[2]
 READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
 
 THERE_AND_BACK = """\
