@@ -51,7 +51,6 @@ KINDS = {
     "tests/recording/test_recorder.py": SERVERS[0],
     "tests/recording/test_recorder_in_trouble.py": BROWSER,
     "tests/recording/test_run_again_on_a_server.py": SERVERS[0],
-    "tests/api/test_descriptions.py": SERVERS[1],
     "tests/rosbridge": SERVERS[1],
     # The most tests come first, so a file of many takes the single test of the types along.
     "tests/control/test_transitions.py": EARLY,

@@ -14,14 +14,15 @@ import jsonschema
 import pytest
 
 from katana450.arm.control.commands.act import tag_of
+from katana450.assembly.robot_session import find_robot
 from katana450.extensions.api_description import openapi_json
+from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
+from katana450.settings import Settings
 from tests.api.test_documented import EVERY_REQUEST
-from tests.browser.server import RECORDING_APP, AppServer
 from tests.commands import completed
 from tests.exchange.tools import OPENAPI_VALIDATOR, needs_package
-from tests.gateway.client import ask
-from tests.gateway.lines import Lines
+from tests.gateway.virtual import Socket, VirtualServer
 
 
 @cache
@@ -31,8 +32,8 @@ def openapi() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer((*RECORDING_APP, "--lines", "0")) as server:
+def local() -> Iterator[VirtualServer]:
+    with VirtualServer(find_robot(Settings(), URDF_PATH, None)) as server:
         yield server
 
 
@@ -107,11 +108,13 @@ def checked(message: dict[str, Any]) -> str:
     return name
 
 
-def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
-    lines, kinds = Lines(server), set()
-    with lines.socket, lines.reader:
-        lines.say(do="hello", name="Schemas")
-        kinds.add(checked(lines.hear()))
+async def test_welcome_fits_its_schema(local: VirtualServer) -> None:
+    socket = Socket(local, "/api/v1/socket?name=Schemas", {})
+    assert checked(json.loads(await socket.recv())) == "Welcome"
+
+
+def test_messages_of_a_server_fit_the_schemas(local: VirtualServer) -> None:
+    with local.speaking("Schemas") as lines:
         questions: list[dict[str, Any]] = [
             *(
                 {"do": "query", "at": topic}
@@ -125,9 +128,9 @@ def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
             {"do": "joint", "axis": 5, "value": 40},
             {"do": "joint", "axis": 9, "value": 0},
         ]
-        for request in questions:
-            kinds.add(checked(lines.answer(**request)))
-    assert kinds == {kind.__name__ for kind in answers.EVERY} - {"Mesh", "Scene"}
+        kinds = {checked(lines.answer(**request)) for request in questions}
+    others = {"Mesh", "Scene", "Welcome"}
+    assert kinds == {kind.__name__ for kind in answers.EVERY} - others
     with pytest.raises(jsonschema.ValidationError):
         checked({"is": "echo", "n": "one"})
     # A pose is four rows of four numbers.
@@ -138,8 +141,8 @@ def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
         jsonschema.Draft202012Validator(schema).validate({**pose, "T": [[1, 0, 0, 0.4]]})
 
 
-def test_a_server_describes_all_its_paths(server: AppServer) -> None:
-    served = json.loads(ask(f"{server.url}/api/v1/openapi.json")[2])
+def test_a_server_describes_all_its_paths(local: VirtualServer) -> None:
+    served = json.loads(local.ask("/api/v1/openapi.json")[2])
     assert served["paths"] == openapi()["paths"]
 
 

@@ -94,16 +94,12 @@ async def act(server: AppServer, tokens: dict[str, str], numbers: dict[str, str]
         await vera.say("stop")
         await otto.wait(stop="confirmed")
         await refused(vera, "clear_stop")
-        await asyncio.sleep(PAUSE)
-        await otto.say("clear_stop")
-        await otto.wait(stopped=None)
+        await otto.clear_stop()
         url, bearer = f"{server.stop_url}/api/v1/stop", f"Bearer {tokens['Vera']}"
         pressed = asyncio.to_thread(ask, url, data=b"", Authorization=bearer, X_Name="Phone")
         assert (await pressed)[0] == 200
         await otto.wait(stop="confirmed")
-        await asyncio.sleep(PAUSE)
-        await otto.say("clear_stop")
-        await otto.wait(stopped=None)
+        await otto.clear_stop()
         await ada.say("take")
         await ada.wait(mine=True)
         await ada.say("release_lease")

@@ -137,17 +137,18 @@ def test_stop_with_a_body_or_without_reading_the_answer_counts(
     until(lambda: program.query(answers.State).stop == "confirmed")
 
 
-def test_stop_is_confirmed_while_the_front_end_is_frozen() -> None:
-    with AppServer(APP) as server, connect(server.url, "Driver") as program:
-        # The timeout of the front end is long, so that only STOP can stop the arm.
-        before = under_way(program)
-        with server.frozen(server.front):
-            assert stop(server.stop_url, X_Name="Vera")[0] == 200
-        until(lambda: program.query(answers.State).stop == "confirmed")
-        state = program.query(answers.State)
-        # The reason is the press, not the silence, because the press came first.
-        assert state.stopped == "Vera pressed STOP."
-        assert state.q[0] - before.q[0] < 1.5
+def test_stop_is_confirmed_while_the_front_end_is_frozen(
+    server: AppServer, program: Client
+) -> None:
+    # The timeout of the front end is long, so that only STOP can stop the arm.
+    before = under_way(program)
+    with server.frozen(server.front):
+        assert stop(server.stop_url, X_Name="Vera")[0] == 200
+    until(lambda: program.query(answers.State).stop == "confirmed")
+    state = program.query(answers.State)
+    # The reason is the press, not the silence, because the press came first.
+    assert state.stopped == "Vera pressed STOP."
+    assert state.q[0] - before.q[0] < 1.5
 
 
 def test_ended_stop_process_is_reported_and_restarted_while_the_arm_moves() -> None:
