@@ -53,7 +53,7 @@ def test_interrupt_during_the_start_leaves_no_traceback(delay: float) -> None:
     ) as server:
         time.sleep(delay)
         os.killpg(server.pid, signal.SIGINT)
-        output = server.communicate(timeout=60.0)[0]
+        output = server.communicate(timeout=180.0)[0]
     assert "Traceback" not in output
 
 
@@ -66,7 +66,7 @@ def failing(_supervisor: SupervisorPipe) -> None:
 def test_failed_start_lists_no_leaks(capfd: pytest.CaptureFixture[str]) -> None:
     supervisor = Supervisor([child_spec("it", "It", failing, 5.0)], threading.Event())
     supervisor.start()
-    supervisor._children["it"].process.join(60.0)
+    supervisor._children["it"].process.join(180.0)
     supervisor.stop()
     errors = capfd.readouterr().err
     assert "It fails with" in errors
@@ -91,7 +91,7 @@ def test_end_amid_work_of_a_thread_lists_no_leaks(capfd: pytest.CaptureFixture[s
     supervisor = Supervisor([child_spec("it", "It", ended_amid_work, 5.0)], threading.Event())
     supervisor.start()
     process = supervisor._children["it"].process
-    process.join(60.0)
+    process.join(180.0)
     supervisor.stop()
     output = capfd.readouterr()
     assert process.exitcode == 0

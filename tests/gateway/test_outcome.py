@@ -157,7 +157,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
                 wait_until_clearable(program)
             before = program.query(answers.State).ticket
             answer = done(program.ask(request))
-            time.sleep(2.0)
+            time.sleep(0.5)
             if kind is Program:
                 wait_until_planned(program)
             if answer.outcome is None:

@@ -70,7 +70,7 @@ def ask(
 
 def finish(table: Staged, participant: Participant, slow: Slow) -> None:
     slow.released.set()
-    until(lambda: table.status != "planning", 20.0)
+    until(lambda: table.status != "planning", 60.0)
     table.wait(0.2, participant)
 
 

@@ -73,7 +73,7 @@ class Staged(Table):
     def plan(self, participant: Participant, script: str = SCRIPT) -> None:
         """Plan ``script`` and wait for the planning thread."""
         self.programs.script(participant, script, more=False, speed=1.0)
-        until(lambda: self.status != "planning", 10.0)
+        until(lambda: self.status != "planning", 60.0)
 
     def run(self, participant: Participant, script: str = SCRIPT) -> None:
         """Plan ``script`` and begin it."""
@@ -208,7 +208,7 @@ def test_command_from_before_a_stop_is_not_executed_after_it(table: Staged) -> N
         table.panel.plan(SCRIPT, ProgramOrder.RUN, clicked)
     with pytest.raises(LeaseError, match="Do it again"):
         table.panel.steer(ProgramOrder.RUN, clicked)
-    until(lambda: table.status != "planning", 10.0)
+    until(lambda: table.status != "planning", 60.0)
     table.wait(1.0, participant)
     assert table.status == "ready"
     assert not program_runner.running
@@ -312,7 +312,7 @@ def test_owner_must_be_there_when_an_unattended_program_begins(
     assert not table.programs.running
     table.t += 2.0 * OWNER_SILENCE
     table.hub.tick()
-    until(lambda: table.status != "planning", 10.0)
+    until(lambda: table.status != "planning", 60.0)
     table.wait(1.0)
     assert table.status == "ready"
     assert not table.programs.running
