@@ -131,8 +131,7 @@ def test_tool_turns_about_a_lip_over_the_middle_of_the_basin(tmp_path: Path) -> 
 @pytest.mark.parametrize("name", ["UR5e", "Panda", "four long axes"])
 def test_cup_is_emptied_about_its_lip(name: str, tmp_path: Path) -> None:
     pour = poured(tmp_path, name, "{into: basin, shake: 1}")
-    trace = pour.simulation.trace
-    values = measurements(pour.plan.program, pour.plan.robot.require_arm(), trace)
+    values = measurements(pour.simulation)
     assert values["emptied_percent"] is not None
     assert 99.5 < values["emptied_percent"] < 99.99
     assert values["spilled_ml"] == 0.0
@@ -140,7 +139,7 @@ def test_cup_is_emptied_about_its_lip(name: str, tmp_path: Path) -> None:
     assert values["carried_margin_to_rim_mm"] > 1.0
     # The lip stays where it is while the cup turns, and is over the middle of the basin.
     names = [task.name for task in pour.plan.program.tasks]
-    ticks = np.flatnonzero(trace.task == names.index(POURING)).tolist()
+    ticks = np.flatnonzero(pour.simulation.tasks == names.index(POURING)).tolist()
     tilted = [s for s in map(pour.simulation.states.__getitem__, ticks) if _tilt(pour, s) > 5.0]
     lips = np.array([pour.lip(state) for state in tilted])
     assert np.ptp(lips, axis=0).max() < MICROMETRE

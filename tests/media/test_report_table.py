@@ -36,8 +36,7 @@ WRITTEN = datetime(2026, 1, 1, tzinfo=UTC)
 
 def reported(text: str) -> tuple[Planned, Report]:
     plan = plan_script(parse(text), URDF_PATH)
-    trace = run_by_clock(plan).trace
-    return plan, Report.of(plan.script, plan.program, plan.robot.require_arm(), trace, {}, ())
+    return plan, Report.of(plan.script, run_by_clock(plan), {}, ())
 
 
 @pytest.fixture(scope="module")
@@ -52,10 +51,10 @@ def test_table_is_read_as_the_motion_that_was_run(
     path = tmp_path / "trace.csv"
     path.write_text(report.csv(), encoding="utf-8")
     motion = load_motion(path, plan.robot)
-    assert (motion.t == report.trace.t - report.trace.t[0]).all()
+    assert (motion.t == report.run.t - report.run.t[0]).all()
     for axis, name in enumerate(plan.robot.driven[:5]):
         # Degrees and back: one rounding each way.
-        assert np.allclose(motion.values[name], report.trace.q[:, axis], rtol=4e-16, atol=0.0)
+        assert np.allclose(motion.values[name], report.run.q[:, axis], rtol=4e-16, atol=0.0)
 
 
 def test_table_has_the_water_once_there_is_some(run: tuple[Planned, Report]) -> None:
@@ -77,7 +76,7 @@ def test_measured_arm_is_apart_from_its_setpoints(tmp_path: Path) -> None:
     offset = np.array((0.003, 0.0, 0.0, 0.0, 0.0))
     driver = LaggingDriver(arm, start.q, start.gripper, 10, offset)
     simulation = run_by_clock(plan, driver)
-    commanded = Report.of(plan.script, plan.program, arm, simulation.trace, {}, ())
+    commanded = Report.of(plan.script, simulation, {}, ())
     assert commanded.with_measured(None, "nothing") is commanded
     run = MeasuredRun.of(arm, simulation.states)
     report = commanded.with_measured(run, "a test")
@@ -91,7 +90,7 @@ def test_measured_arm_is_apart_from_its_setpoints(tmp_path: Path) -> None:
     rows = list(csv.DictReader(io.StringIO(report.csv())))
     for row, q, tick in zip(rows, simulation.states, range(len(rows)), strict=True):
         assert float(row["measured_theta1_deg"]) == pytest.approx(np.degrees(q.q[0]), rel=1e-15)
-        assert float(row["theta1_deg"]) == np.degrees(report.trace.q[tick, 0])
+        assert float(row["theta1_deg"]) == np.degrees(report.run.q[tick, 0])
     pytest.importorskip("matplotlib")
     files = report.write(tmp_path, WRITTEN)
     assert tmp_path / "measured.png" in files
@@ -123,7 +122,7 @@ def test_distances_are_drawn_by_a_round_factor_that_fits() -> None:
 
 
 def test_water_figure_is_drawn(run: tuple[Planned, Report]) -> None:
-    pour = PourRecord.of(run[1].trace)
+    pour = PourRecord.of(run[1].run)
     assert pour is not None
     assert pour.flow.max() == 0.0
     assert figures.water_figure(pour).startswith(b"\x89PNG")
@@ -146,4 +145,4 @@ def test_broken_table_is_refused_with_its_row(run: tuple[Planned, Report], tmp_p
     path.write_text("\n".join(lines), encoding="utf-8")
     with pytest.raises(InputError, match=r"Row 3 of .*much"):
         load_motion(path, plan.robot)
-    assert math.isfinite(report.trace.t[-1])
+    assert math.isfinite(report.run.t[-1])

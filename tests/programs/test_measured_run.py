@@ -121,7 +121,7 @@ def test_exact_arm_is_not_measured_and_has_no_such_trace() -> None:
     plan = planned(LINE)
     simulation = run_by_clock(plan)
     assert MeasuredRun.of(plan.robot.require_arm(), simulation.states) is None
-    assert simulation.trace.measured is None
+    assert simulation.measured is None
 
 
 def test_plant_lags_by_its_delay_and_friction() -> None:
@@ -134,11 +134,9 @@ def test_plant_lags_by_its_delay_and_friction() -> None:
     assert 18.0 <= (run.values["tracking_lag_ms"] or 0.0) <= 40.0
     assert 0.01 < (run.values["measured_position_error_mm"] or 0.0) < 2.0
     assert 0.0 < (run.values["joint_tracking_error_deg"] or 0.0) < 0.5
-    trace = simulation.trace
-    assert trace.measured is not None
-    # The setpoints are apart from what is measured, and as exact as ever.
-    assert (trace.sent == trace.q).all()
-    assert np.abs(trace.measured - trace.q).max() > 1e-3
+    assert simulation.measured is not None
+    # The setpoints are apart from what is measured.
+    assert np.abs(simulation.measured - simulation.q).max() > 1e-3
 
 
 def test_unmoved_arm_has_no_lag(line: tuple[Planned, Simulation, MeasuredRun]) -> None:

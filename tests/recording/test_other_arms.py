@@ -93,8 +93,8 @@ def test_motion_runs_again(
     command = ["record", "again", str(path), "--urdf", str(urdf), "--out", str(script)]
     assert main(command) == 0
     text = script.read_text(encoding="utf-8")
-    trace = run_by_clock(plan_script(parse(text), urdf)).trace
-    passed = np.abs(trace.q[:, None] - katana450.open(path).setpoint).max(axis=2).min(axis=0)
+    run = run_by_clock(plan_script(parse(text), urdf))
+    passed = np.abs(run.q[:, None] - katana450.open(path).setpoint).max(axis=2).min(axis=0)
     assert passed.max() < 20.0 * TOLERANCE
     # Its script is refused for an arm of five axes.
     script.write_text(text.replace("tool: tool0\n", ""), encoding="utf-8")

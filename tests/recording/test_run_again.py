@@ -77,13 +77,13 @@ def planned(text: str, begin: State | None = None) -> Planned:
 def test_drag_runs_again_within_a_tenth_of_a_milliradian(dragged: Path) -> None:
     part, text = read(dragged)
     plan = planned(text)
-    trace = run_by_clock(plan).trace
-    assert 1e-7 < distance(part, trace.q) < TOLERANCE
+    run = run_by_clock(plan)
+    assert 1e-7 < distance(part, run.q) < TOLERANCE
     # Limits, and the way to the start, make it slower, but not by much.
-    assert part.duration < trace.t[-1] < 2.5 * part.duration
+    assert part.duration < run.t[-1] < 2.5 * part.duration
     limits = plan.robot.require_arm().limits
-    assert (np.abs(np.diff(trace.q, axis=0)) / 0.01 <= 1.001 * limits.speed).all()
-    assert (np.abs(np.diff(trace.q, 2, axis=0)) / 1e-4 <= 1.001 * limits.acceleration).all()
+    assert (np.abs(np.diff(run.q, axis=0)) / 0.01 <= 1.001 * limits.speed).all()
+    assert (np.abs(np.diff(run.q, 2, axis=0)) / 1e-4 <= 1.001 * limits.acceleration).all()
 
 
 def test_rests_are_kept(dragged: Path) -> None:
@@ -114,12 +114,12 @@ def test_pause_or_stop_in_the_middle_is_left_out(tmp_path: Path, disturbance: st
     commands = {120: begin, 420: end, 430: cmd.Position(np.array((0.33, 0.05, 0.08)))}
     path = record_session(tmp_path / "disturbed.mcap", 700, drag(120, commands))
     part, text = read(path)
-    trace = run_by_clock(planned(text)).trace
-    assert distance(part, trace.q) < TOLERANCE
+    run = run_by_clock(planned(text))
+    assert distance(part, run.q) < TOLERANCE
     assert sum(float(word) for word in re.findall(r"wait: ([\d.]+)", text)) < 0.3
     # The time of the pause is not in the recorded time either.
     assert part.t[-1] - part.duration > 1.5
-    assert trace.t[-1] < 2.5 * part.duration
+    assert run.t[-1] < 2.5 * part.duration
 
 
 def test_grasp_and_carried_object_are_repeated(tmp_path: Path) -> None:

@@ -117,7 +117,7 @@ def test_line_has_its_length_and_the_measures_of_the_report(line: Path) -> None:
     )
     assert np.linalg.norm(result.tool[-1] - result.tool[0]) == pytest.approx(0.06, abs=1e-4)
     plan = plan_script(parse(LINE), URDF_PATH)
-    report = measurements(plan.program, plan.session.require_arm(), run_by_clock(plan).trace)
+    report = measurements(run_by_clock(plan))
     for name in ("margin_to_limits_deg", "smallest_singular_value", "max_speed_fraction"):
         assert result.values[name] == pytest.approx(report[name], rel=0.02), name
     # Samples find a place that is a little farther away.
@@ -183,7 +183,7 @@ def test_pour_has_the_measures_of_its_report(tmp_path: Path) -> None:
     text = script_text(library_file("pour"))
     result = score(record_session(tmp_path / "pour.mcap", 3700, program(text)))
     plan = plan_script(parse(text), URDF_PATH)
-    report = measurements(plan.program, plan.session.require_arm(), run_by_clock(plan).trace)
+    report = measurements(run_by_clock(plan))
     for name in ("emptied_percent", "spilled_ml", "margin_to_limits_deg"):
         assert result.values[name] == pytest.approx(report[name], rel=0.02, abs=0.01), name
     assert result.values["emptied_ml"] == pytest.approx(199.7, abs=0.3)

@@ -72,11 +72,10 @@ def simulate(script: Script, options: Namespace) -> int:
         "ticks_per_s": Settings().rate,
         "seed": options.seed,
     }
-    arm = robot.require_arm()
-    report = Report.of(script, program, arm, simulation.trace, facts, notes)
-    measured = MeasuredRun.of(arm, simulation.states)
+    report = Report.of(script, simulation, facts, notes)
+    measured = MeasuredRun.of(simulation.arm, simulation.states)
     report = report.with_measured(measured, f"a simulated plant, {options.plant}")
-    print(f"{script.name}: {len(report.trace.t)} ticks, {report.trace.t[-1]:.2f} s.")
+    print(f"{script.name}: {len(simulation.t)} ticks, {simulation.t[-1]:.2f} s.")
     print("\n".join(f"  {line}" for line in report.lines))
     if options.report is not None:
         # Imported here, because only the pictures of a report need the renderer.
@@ -84,9 +83,7 @@ def simulate(script: Script, options: Namespace) -> int:
 
         pictures = NONE
         try:
-            pictures = stage_pictures(
-                program, robot, plan.session, load_props(), simulation.states, report.trace
-            )
+            pictures = stage_pictures(simulation, robot, load_props())
         except MissingExtraError as error:
             print(f"The report has figures, but no pictures of the arm. {error}")
         report.write(options.report, datetime.now().astimezone(), pictures)

@@ -11,10 +11,9 @@ from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
 
-from katana450.arm.control.arm import ArmModel
 from katana450.extensions.media.measures import PathTrace, PourRecord
 from katana450.extensions.programs.run.measured_run import Deviation, MeasuredRun
-from katana450.extensions.programs.run.simulation import Trace
+from katana450.extensions.programs.run.simulation import Simulation
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.path import point_derivatives
 
@@ -228,39 +227,39 @@ def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
 
 
 @as_png
-def joints_figure(plt: Any, trace: Trace) -> Any:
+def joints_figure(plt: Any, run: Simulation) -> Any:
     """Draw the joint variables over time (the paper's Fig. 8)."""
     figure, panel = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
-    degrees = np.degrees(trace.q)
-    draw_joints(panel, trace.t, degrees, linewidth=1.4)
-    if trace.measured is not None:
-        for axis, column in enumerate(np.degrees(trace.measured).T):
-            panel.plot(trace.t, column, **MEASURED, label=None if axis else "measured")
+    degrees = np.degrees(run.q)
+    draw_joints(panel, run.t, degrees, linewidth=1.4)
+    if run.measured is not None:
+        for axis, column in enumerate(np.degrees(run.measured).T):
+            panel.plot(run.t, column, **MEASURED, label=None if axis else "measured")
     panel.legend(**ABOVE, ncols=degrees.shape[1] + 1, handlelength=1.1, columnspacing=1.0)
-    _label(panel, "Joint variables", "angle (deg)", trace.t)
+    _label(panel, "Joint variables", "angle (deg)", run.t)
     return figure
 
 
 @as_png
-def speeds_figure(plt: Any, arm: ArmModel, trace: Trace) -> Any:
+def speeds_figure(plt: Any, run: Simulation) -> Any:
     """Draw joint speeds as fractions of their limits, and of the speed of the tool."""
     figure, (upper, lower) = plt.subplots(
         2, 1, figsize=(7.2, 4.6), sharex=True, layout="constrained", height_ratios=(3, 2)
     )
-    fractions = 100.0 * trace.qd / arm.chain.speed
-    draw_joints(upper, trace.t, fractions, linewidth=1.2)
+    fractions = 100.0 * run.qd / run.arm.chain.speed
+    draw_joints(upper, run.t, fractions, linewidth=1.2)
     for limit in (-100.0, 100.0):
         upper.axhline(limit, color=ERROR, linewidth=0.8, linestyle=(0, (4, 3)))
     upper.set_ylim(-115.0, 115.0)
     upper.set_title("Joint speeds as fractions of their limits")
     upper.set_ylabel("speed (% of limit)")
     upper.legend(**ABOVE, ncols=fractions.shape[1], handlelength=1.1, columnspacing=1.0)
-    tools = [arm.kinematics_to(tool) for tool in trace.tools]
-    rows = zip(tools, trace.q, trace.qd, strict=True)
+    tools = [run.arm.kinematics_to(state.tool) for state in run.states]
+    rows = zip(tools, run.q, run.qd, strict=True)
     speeds = 1e3 * np.array([tool.tool_speed(q, qd) for tool, q, qd in rows])
-    lower.fill_between(trace.t, speeds, color=AXES[0], alpha=0.15, linewidth=0.0)
-    lower.plot(trace.t, speeds, color=AXES[0], linewidth=1.2)
-    _label(lower, "Speed of the tool point", "speed (mm/s)", trace.t)
+    lower.fill_between(run.t, speeds, color=AXES[0], alpha=0.15, linewidth=0.0)
+    lower.plot(run.t, speeds, color=AXES[0], linewidth=1.2)
+    _label(lower, "Speed of the tool point", "speed (mm/s)", run.t)
     lower.set_ylim(bottom=0.0)
     return figure
 

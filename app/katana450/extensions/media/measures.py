@@ -13,10 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from katana450.arm.control.arm import ArmModel
 from katana450.extensions.programs.building.actions import FollowPlan, Task
-from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.run.simulation import Trace
+from katana450.extensions.programs.run.measured_run import path_of, place_of, run_errors
+from katana450.extensions.programs.run.simulation import Simulation
 from katana450.extensions.programs.script.measures import motion_measures, water_measures
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.steps.pouring import POURING
@@ -83,16 +82,16 @@ class Bound:
         return f"{self.name} {is_now}; expected is {self.wanted}."
 
 
-def executed_tasks(program: Program, trace: Trace) -> tuple[Task, ...]:
+def executed_tasks(run: Simulation) -> tuple[Task, ...]:
     """Return the tasks of a run, without those of alternatives that it has not taken."""
-    executed = set(trace.task.tolist())
-    return tuple(task for number, task in enumerate(program.tasks) if number in executed)
+    executed = set(run.tasks.tolist())
+    return tuple(task for number, task in enumerate(run.program.tasks) if number in executed)
 
 
-def alongs(program: Program, trace: Trace) -> tuple[PathTrace, ...]:
+def alongs(run: Simulation) -> tuple[PathTrace, ...]:
     """Return the paths of the tool in a run, each repeated path once."""
     traces: dict[int, PathTrace] = {}
-    for task in executed_tasks(program, trace):
+    for task in executed_tasks(run):
         if not isinstance(task.action, FollowPlan):
             continue
         for segment in task.action.plan.segments:
@@ -102,16 +101,16 @@ def alongs(program: Program, trace: Trace) -> tuple[PathTrace, ...]:
     return tuple(traces.values())
 
 
-def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, float | None]:
+def measurements(run: Simulation) -> dict[str, float | None]:
     """Return each of MEASURES by its name; None if it does not apply."""
-    paths = alongs(program, trace)
+    paths, limits = alongs(run), run.arm.limits
     errors = np.concatenate([path.error for path in paths]) if paths else np.empty(0)
     turned = np.concatenate([path.turned for path in paths]) if paths else np.empty(0)
-    at_ticks, between = executed(program, trace)
-    moved = motion_measures(arm, trace.tools, trace.q, trace.qd)
+    tools = [state.tool for state in run.states]
+    moved = motion_measures(run.arm, tools, run.q, run.qd)
     nearest = [
         task.action.plan.nearest.contact.distance
-        for task in executed_tasks(program, trace)
+        for task in executed_tasks(run)
         if isinstance(task.action, FollowPlan)
         and task.action.plan.nearest is not None
         # An object to be lifted touches the table at first.
@@ -121,44 +120,36 @@ def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, flo
         "max_position_error_mm": _maximum(1e3 * errors),
         "rms_position_error_mm": 1e3 * float(np.sqrt(np.mean(errors**2))) if paths else None,
         "max_orientation_error_deg": _maximum(np.degrees(turned)),
-        "executed_position_error_mm": _maximum(1e3 * at_ticks),
-        "between_ticks_error_mm": _maximum(1e3 * between),
+        "executed_position_error_mm": _maximum(1e3 * run_errors(run.states)),
+        "between_ticks_error_mm": _maximum(1e3 * errors_between_ticks(run)),
         "path_length_mm": 1e3 * sum(_length(path.desired) for path in paths) if paths else None,
         "smallest_singular_value": moved["smallest_singular_value"],
         "margin_to_limits_deg": moved["margin_to_limits_deg"],
         "nearest_clearance_mm": 1e3 * min(nearest) if nearest else None,
         "max_speed_fraction": moved["max_speed_fraction"],
-        "max_acceleration_fraction": _fraction(trace, arm.limits.acceleration, 2),
-        "max_jerk_fraction": _fraction(trace, arm.limits.jerk, 3),
+        "max_acceleration_fraction": _fraction(run, limits.acceleration, 2),
+        "max_jerk_fraction": _fraction(run, limits.jerk, 3),
         "max_tool_speed_mm_s": moved["max_tool_speed_mm_s"],
-        "duration_s": float(trace.t[-1]),
-        **_of_water(program, trace),
+        "duration_s": float(run.t[-1]),
+        **_of_water(run),
     }
 
 
-def executed(program: Program, trace: Trace) -> tuple[FloatArray, FloatArray]:
-    """Return the distances of the arm from its tool paths [m]: at the ticks, and midway between.
+def errors_between_ticks(run: Simulation) -> FloatArray:
+    """Return the distances (N,) [m] of the setpoints across the tool's paths, midway between ticks.
 
-    At a tick it is the distance from the point of the path at that time, so at least the distance
-    from the path. Midway, it is the distance across the path, with the joints interpolated linearly
-    as by a drive.
+    The joints are interpolated linearly, as by a drive.
     """
-    at_ticks: list[float] = []
-    between: list[float] = []
-    on = [path_at(program, trace, tick) for tick in range(len(trace.t))]
-    for tick, path in enumerate(on):
-        if path is not None:
-            q, sigma = trace.sent[tick], float(trace.sigma[tick])
-            at_ticks.append(float(np.linalg.norm(_point(path, q) - _curve(path, sigma)[0])))
-    for before, after in pairwise(range(len(trace.t))):
-        path = on[before]
-        if path is None or path is not on[after] or trace.sigma[before] == trace.sigma[after]:
+    errors: list[float] = []
+    for before, after in pairwise(run.states):
+        path, sigma, next_sigma = path_of(before), place_of(before), place_of(after)
+        if path is None or path is not path_of(after) or sigma == next_sigma:
             continue
-        q = 0.5 * (trace.sent[before] + trace.sent[after])
-        p, tangent = _curve(path, float(0.5 * (trace.sigma[before] + trace.sigma[after])))
+        q = 0.5 * (before.setpoint + after.setpoint)
+        p, tangent = _curve(path, 0.5 * (sigma + next_sigma))
         off = _point(path, q) - p
-        between.append(float(np.linalg.norm(off - (off @ tangent) * tangent)))
-    return np.array(at_ticks), np.array(between)
+        errors.append(float(np.linalg.norm(off - (off @ tangent) * tangent)))
+    return np.array(errors)
 
 
 def bounds(script: Script, values: dict[str, float | None]) -> tuple[Bound, ...]:
@@ -177,15 +168,6 @@ def _along(name: str, path: CurvePath) -> PathTrace:
     )
 
 
-def path_at(program: Program, trace: Trace, tick: int) -> CurvePath | None:
-    """Return the path of the tool at ``tick``; None while it is on none."""
-    action, segment = program.tasks[int(trace.task[tick])].action, int(trace.segment[tick])
-    if segment < 0 or not isinstance(action, FollowPlan):
-        return None
-    path = action.plan.segments[segment].path
-    return path if isinstance(path, CurvePath) else None
-
-
 def _point(path: CurvePath, q: FloatArray) -> FloatArray:
     p: FloatArray = forward(path.chain, q)[:3, 3]
     return p
@@ -202,31 +184,30 @@ def _curve(path: CurvePath, sigma: float) -> tuple[FloatArray, FloatArray]:
     return p, rate / length if length > 0.0 else rate
 
 
-def _fraction(trace: Trace, maximum: FloatArray, order: int) -> float:
+def _fraction(run: Simulation, maximum: FloatArray, order: int) -> float:
     """Return the maximum derivative of that order of the setpoints as a fraction of ``maximum``."""
-    period = float(trace.t[-1]) / (len(trace.t) - 1)
-    return float(
-        (np.abs(np.diff(trace.q, order, axis=0)) / period**order / maximum).max(initial=0.0)
-    )
+    period = float(run.t[-1]) / (len(run.t) - 1)
+    return float((np.abs(np.diff(run.q, order, axis=0)) / period**order / maximum).max(initial=0.0))
 
 
 def _length(points: FloatArray) -> float:
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
-def _of_water(program: Program, trace: Trace) -> dict[str, float | None]:
+def _of_water(run: Simulation) -> dict[str, float | None]:
     """Return the measures of the water; none without water."""
-    end = trace.water[-1]
+    end = run.states[-1].poured
     if end is None:
         return {}
     measured = water_measures(end.water, end.course)
-    executed = sorted(set(trace.task.tolist()))
-    pours = [number for number in executed if program.tasks[number].name == POURING]
-    carried = trace.task < (pours[0] if pours else len(program.tasks))
+    tasks = run.program.tasks
+    executed = sorted(set(run.tasks.tolist()))
+    pours = [number for number in executed if tasks[number].name == POURING]
+    carried = run.tasks < (pours[0] if pours else len(tasks))
     return {
         "emptied_percent": measured["emptied_percent"],
         "spilled_ml": measured["spilled_ml"],
-        "carried_margin_to_rim_mm": 1e3 * float(trace.margin[carried].min()),
+        "carried_margin_to_rim_mm": 1e3 * float(run.margin[carried].min()),
         "cup_peak_jerk_m_s3": measured["cup_peak_jerk_m_s3"],
     }
 
@@ -260,14 +241,14 @@ class PourRecord:
     lip: FloatArray
 
     @staticmethod
-    def of(trace: Trace) -> PourRecord | None:
-        """Return the record of ``trace``; None for a run without water."""
-        rows = np.array([_row(poured) for poured in trace.water])
+    def of(run: Simulation) -> PourRecord | None:
+        """Return the record of ``run``; None for one without water."""
+        rows = np.array([_row(state.poured) for state in run.states])
         if not (np.nan_to_num(rows[:, :5]) > 0.0).any():
             return None
         cup, film, basin, air, spilled, tilt = rows.T
-        lip = np.where(np.isfinite(trace.margin) & (cup > 0.0), trace.margin, math.nan)
-        return PourRecord(trace.t, cup, film, basin, air, spilled, tilt, lip)
+        lip = np.where(np.isfinite(run.margin) & (cup > 0.0), run.margin, math.nan)
+        return PourRecord(run.t, cup, film, basin, air, spilled, tilt, lip)
 
     @property
     def flow(self) -> FloatArray:

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from katana450.arm.control.arm import ArmModel
 from katana450.atomic import write_files, writer_of
 from katana450.caching import cached_property
 from katana450.errors import InputError
@@ -29,9 +28,8 @@ from katana450.extensions.media.measures import (
     bounds,
     measurements,
 )
-from katana450.extensions.programs.run.measured_run import MeasuredRun
-from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.run.simulation import Trace
+from katana450.extensions.programs.run.measured_run import MeasuredRun, place_of
+from katana450.extensions.programs.run.simulation import Simulation
 from katana450.extensions.programs.script.measures import MEASURES, title_of, unit_of
 from katana450.extensions.programs.script.script import Script
 from katana450.maths.geometry.arrays import FloatArray
@@ -47,9 +45,7 @@ class Report:
 
     Attributes:
         script: the script.
-        program: the compiled script.
-        arm: the arm model.
-        trace: the record of the run.
+        run: the run.
         values: each measure by its name.
         bounds: the bounds that the script expects.
         facts: conditions of the run, by name.
@@ -58,9 +54,7 @@ class Report:
     """
 
     script: Script
-    program: Program
-    arm: ArmModel
-    trace: Trace
+    run: Simulation
     values: dict[str, float | None]
     bounds: tuple[Bound, ...]
     facts: dict[str, Any]
@@ -70,29 +64,27 @@ class Report:
     @staticmethod
     def of(
         script: Script,
-        program: Program,
-        arm: ArmModel,
-        trace: Trace,
+        run: Simulation,
         facts: dict[str, Any],
         notes: tuple[str, ...] = (),
     ) -> Report:
         """Return the report with all measures."""
-        values = measurements(program, arm, trace)
-        return Report(script, program, arm, trace, values, bounds(script, values), facts, notes)
+        values = measurements(run)
+        return Report(script, run, values, bounds(script, values), facts, notes)
 
     @property
     def missed(self) -> list[Bound]:
         """The bounds that are not met."""
         return [bound for bound in self.bounds if not bound.held]
 
-    def with_measured(self, run: MeasuredRun | None, what: str) -> Report:
-        """Return the report with ``run``, the same script on an arm that is measured: ``what``."""
-        if run is None:
+    def with_measured(self, measured: MeasuredRun | None, what: str) -> Report:
+        """Return the report with the run as it was ``measured``; ``what``: the arm."""
+        if measured is None:
             return self
-        values = self.values | run.values
+        values = self.values | measured.values
         facts = self.facts | {"measured": what}
         checked = bounds(self.script, values)
-        return replace(self, values=values, bounds=checked, facts=facts, measured=run)
+        return replace(self, values=values, bounds=checked, facts=facts, measured=measured)
 
     @property
     def held(self) -> bool:
@@ -146,7 +138,7 @@ class Report:
 
     @cached_property
     def _pour(self) -> PourRecord | None:
-        return PourRecord.of(self.trace)
+        return PourRecord.of(self.run)
 
     def csv(self) -> str:
         """Return one row per tick: time, step, line, task, joints, speeds, fingers, tool, path.
@@ -154,27 +146,27 @@ class Report:
         With water also the columns of `PourRecord`; with a measured arm its joints and tool. Each
         number has all its digits, so that reading gives the same.
         """
-        trace, pour = self.trace, self._pour
-        tasks = [self.program.tasks[number] for number in trace.task.tolist()]
-        slides = self.arm.gripper.slides
+        run, pour = self.run, self._pour
+        tasks = [run.program.tasks[number] for number in run.tasks.tolist()]
+        slides, fingers = run.arm.gripper.slides, [state.gripper for state in run.states]
         columns: dict[str, Iterable[Any]] = {
-            "t_s": trace.t,
+            "t_s": run.t,
             "step": [task.number + 1 for task in tasks],
             "line": [task.line for task in tasks],
             "task": [task.name for task in tasks],
-            **_of_joints(trace.q, "theta{}_deg"),
-            **_of_joints(trace.qd, "theta{}_deg_s"),
+            **_of_joints(run.q, "theta{}_deg"),
+            **_of_joints(run.qd, "theta{}_deg_s"),
             "fingers_mm" if slides else "fingers_deg": (
-                1e3 * trace.fingers if slides else np.degrees(trace.fingers)
+                1e3 * np.array(fingers) if slides else np.degrees(fingers)
             ),
-            "tool": trace.tools,
-            **self._of_tool(trace.q, ""),
-            "path_fraction": trace.sigma,
+            "tool": [state.tool for state in run.states],
+            **self._of_tool(run.q, ""),
+            "path_fraction": [place_of(state) for state in run.states],
             **({} if pour is None else pour.columns),
         }
-        if trace.measured is not None:
-            columns |= _of_joints(trace.measured, "measured_theta{}_deg")
-            columns |= self._of_tool(trace.measured, "measured_")
+        if run.measured is not None:
+            columns |= _of_joints(run.measured, "measured_theta{}_deg")
+            columns |= self._of_tool(run.measured, "measured_")
         file = io.StringIO()
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(columns)
@@ -184,7 +176,7 @@ class Report:
 
     def _of_tool(self, q: FloatArray, prefix: str) -> dict[str, FloatArray]:
         """Return the columns of the tool point at ``q`` (N, n) [rad]."""
-        chains = map(self.arm.chain_to, self.trace.tools)
+        chains = (self.run.arm.chain_to(state.tool) for state in self.run.states)
         points = [1e3 * forward(chain, row)[:3, 3] for chain, row in zip(chains, q, strict=True)]
         x, y, z = np.transpose(points)
         return {f"{prefix}x_mm": x, f"{prefix}y_mm": y, f"{prefix}z_mm": z}
@@ -202,14 +194,14 @@ class Report:
             raise InputError(
                 f"{directory} cannot be created: {error.strerror or error}."
             ) from error
-        paths = alongs(self.program, self.trace)
+        paths = alongs(self.run)
         images = dict(pictures)
         if paths:
             images["path.png"] = figures.path_figure(paths)
         if self.measured is not None:
             images["measured.png"] = measured_figure(self.measured)
-        images["joints.png"] = figures.joints_figure(self.trace)
-        images["speeds.png"] = figures.speeds_figure(self.arm, self.trace)
+        images["joints.png"] = figures.joints_figure(self.run)
+        images["speeds.png"] = figures.speeds_figure(self.run)
         if self._pour is not None:
             images["water.png"] = figures.water_figure(self._pour)
         contents = {

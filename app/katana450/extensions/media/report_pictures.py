@@ -13,17 +13,15 @@ import numpy as np
 from trimesh.creation import cylinder
 from trimesh.util import append_faces
 
-from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
-from katana450.extensions.media.measures import path_at
 from katana450.extensions.media.picture import picture
 from katana450.extensions.media.scene import Camera, Item
 from katana450.extensions.media.stage import RenderStage
-from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.run.simulation import Trace
+from katana450.extensions.programs.run.measured_run import commanded_errors, path_of
+from katana450.extensions.programs.run.simulation import Simulation
 from katana450.extensions.programs.server.traces import DESIRED, PATH_SAMPLES, coloured
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
@@ -83,24 +81,25 @@ DESIRED_RADIUS, TRACED_RADIUS = 1.2e-3, 2e-3
 """[m] Radii of the tubes of the desired and the traced path."""
 
 
-def moments(program: Program, trace: Trace) -> dict[str, int]:
+def moments(run: Simulation) -> dict[str, int]:
     """Return the tick of each picture by its name, for the moments that the run has."""
     # Tasks of alternatives that were not taken are left out.
-    executed = sorted(set(trace.task.tolist()))
-    names = {number: program.tasks[number].name for number in executed}
+    executed, tasks = sorted(set(run.tasks.tolist())), run.program.tasks
+    names = {number: tasks[number].name for number in executed}
     takes = [number for number, name in names.items() if name.endswith(CLOSING)]
     pours = [number for number, name in names.items() if name == POURING]
     ticks_by_name: dict[str, int] = {}
     if takes:
-        start = next(number for number in executed if _same(program, number, takes[0]))
-        ticks_by_name["initial"] = _ticks(trace, start)[0]
-        ticks_by_name["grasping"] = _ticks(trace, takes[0])[-1]
+        step = tasks[takes[0]].number
+        start = next(number for number in executed if tasks[number].number == step)
+        ticks_by_name["initial"] = _ticks(run, start)[0]
+        ticks_by_name["grasping"] = _ticks(run, takes[0])[-1]
     if pours:
-        ticks = _ticks(trace, pours[0])
+        ticks = _ticks(run, pours[0])
         ticks_by_name["approaching"] = ticks[0]
         ticks_by_name["emptying"] = ticks[int(EMPTYING * (len(ticks) - 1))]
     if not ticks_by_name:
-        drawn = [tick for tick in range(len(trace.t)) if path_at(program, trace, tick) is not None]
+        drawn = [tick for tick, state in enumerate(run.states) if path_of(state) is not None]
         if drawn:
             ticks_by_name["tracing"] = drawn[int(DONE * (len(drawn) - 1))]
     return ticks_by_name
@@ -110,24 +109,17 @@ DONE = 0.7
 """[1] Fraction of a path at which the arm is shown."""
 
 
-def stage_pictures(
-    program: Program,
-    robot: Robot,
-    session: Session,
-    props: Props,
-    states: Sequence[State],
-    trace: Trace,
-) -> Mapping[str, bytes]:
+def stage_pictures(run: Simulation, robot: Robot, props: Props) -> Mapping[str, bytes]:
     """Return the PNG files by their names."""
-    stage = RenderStage(robot, session, props)
+    stage, states = RenderStage(robot, run.session, props), run.states
     pictures: dict[str, bytes] = {}
-    ticks = moments(program, trace)
+    ticks = moments(run)
     on_object = ON_TABLE if "grasping" not in ticks else _look(robot, states[ticks["grasping"]])
     for name, tick in ticks.items():
         state, items = states[tick], stage.items(states[tick])
         look = on_object
         if name == "tracing":
-            items += _lines(program, robot, trace, tick)
+            items += _lines(robot, states[: tick + 1])
             look = ON_PATH
         camera = Camera(*look, FOV, SIZE)
         pictures[f"{name}.png"] = picture(items, stage.water(state), camera).png
@@ -146,18 +138,13 @@ def _look(robot: Robot, state: State) -> Look:
     return view.position, view.target
 
 
-def _same(program: Program, one: int, other: int) -> bool:
-    """Return whether two tasks belong to one step."""
-    return program.tasks[one].number == program.tasks[other].number
+def _ticks(run: Simulation, task: int) -> list[int]:
+    return [int(tick) for tick in np.flatnonzero(run.tasks == task)]
 
 
-def _ticks(trace: Trace, task: int) -> list[int]:
-    return [int(tick) for tick in np.flatnonzero(trace.task == task)]
-
-
-def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item]:
-    """Return tubes of the present path and of its traced part, coloured as on the page."""
-    path = path_at(program, trace, tick)
+def _lines(robot: Robot, states: Sequence[State]) -> list[Item]:
+    """Return tubes of the path of the last state and of its traced part, coloured by the error."""
+    path = path_of(states[-1])
     assert path is not None
     T = robot.require_arm().T_base_shoulder
 
@@ -165,10 +152,9 @@ def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item
         return np.asarray(points @ T[:3, :3].T + T[:3, 3])
 
     whole = point_derivatives(path, np.linspace(0.0, 1.0, PATH_SAMPLES + 1))[0]
-    before = [number for number in range(tick + 1) if path_at(program, trace, number) is path]
-    traced = np.array([forward(path.chain, trace.sent[number])[:3, 3] for number in before])
-    desired = point_derivatives(path, trace.sigma[before])[0]
-    worst = np.linalg.norm(traced - desired, axis=1).max()
+    on_path = [state for state in states if path_of(state) is path]
+    traced = np.array([forward(path.chain, state.setpoint)[:3, 3] for state in on_path])
+    worst = commanded_errors(path, on_path).max()
     red, green, blue = coloured(np.array([worst]))[0].tolist()
     tubes = (
         tube("desired path", seen(whole), DESIRED_RADIUS, DESIRED),

@@ -169,12 +169,10 @@ class MeasuredRun:
 
         A measurement belongs to the path on which the setpoint was ``lag`` before.
         """
-        on = [path_of(state) for state in self.states]
         t = np.array([state.t for state in self.states])
         sent = np.searchsorted(t, self.t - (self.lag or 0.0), side="right") - 1
         deviations: list[Deviation] = []
-        for path in {id(path): path for path in on if path is not None}.values():
-            ticks = [number for number, other in enumerate(on) if other is path]
+        for path, ticks in paths_of(self.states):
             rows = np.flatnonzero(np.isin(sent, ticks))
             if not rows.size:
                 continue
@@ -199,16 +197,35 @@ def path_of(state: State) -> CurvePath | None:
     return path if isinstance(path, CurvePath) else None
 
 
+def paths_of(states: Sequence[State]) -> list[tuple[CurvePath, list[int]]]:
+    """Return each desired path of the tool, with the numbers of the ``states`` that are on it."""
+    numbers: dict[int, tuple[CurvePath, list[int]]] = {}
+    for number, state in enumerate(states):
+        if (path := path_of(state)) is not None:
+            numbers.setdefault(id(path), (path, []))[1].append(number)
+    return list(numbers.values())
+
+
+def place_of(state: State) -> float:
+    """Return the place on the path of the plan, from 0 to 1; 0 while the arm follows no plan."""
+    following = state.following
+    return 0.0 if following is None else following.segment.scaling.pace(following.local).sigma
+
+
 def commanded_errors(path: CurvePath, states: Sequence[State]) -> FloatArray:
     """Return the distances (N,) [m] of the setpoints from the points of ``path`` that were due."""
-    sigma = []
-    for state in states:
-        following = state.following
-        assert following is not None
-        sigma.append(following.segment.scaling.pace(following.local).sigma)
     points = forward_batch(path.chain, np.array([state.setpoint for state in states]))[:, :3, 3]
-    desired = point_derivatives(path, np.array(sigma))[0]
+    desired = point_derivatives(path, np.array([place_of(state) for state in states]))[0]
     return np.asarray(np.linalg.norm(points - desired, axis=1))
+
+
+def run_errors(states: Sequence[State]) -> FloatArray:
+    """Return the distances (N,) [m] of the setpoints from all desired paths of the tool."""
+    errors = [
+        commanded_errors(path, [states[number] for number in numbers])
+        for path, numbers in paths_of(states)
+    ]
+    return np.concatenate(errors) if errors else np.empty(0)
 
 
 def nearest_points(path: CurvePath, points: FloatArray) -> FloatArray:

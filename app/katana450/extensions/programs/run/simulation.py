@@ -1,4 +1,4 @@
-"""Planning and simulation of a script on a simulated clock: its trace, and states by time."""
+"""Planning and simulation of a script on a simulated clock, and its states by time."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.modes import IDLE
 from katana450.arm.control.state.state import State
@@ -31,45 +32,10 @@ from katana450.extensions.progress import progress
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.plan import Segment
-from katana450.maths.water.motion import MotionWithWater
 from katana450.settings import Settings
 
 MAX_DURATION = 24 * 3600.0
 """[s] Maximum duration of a program."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trace:
-    """The record of N ticks, the first before anything moves.
-
-    Attributes:
-        t: (N,) [s].
-        q: (N, 5) setpoints [rad].
-        qd: (N, 5) velocities of the setpoints [rad/s].
-        sent: (N, 5) joints that the driver reported, or the setpoints of an arm that is measured
-            [rad].
-        measured: (N, 5) measured joints [rad]; None for an arm that follows exactly.
-        fingers: (N,) finger joint [rad].
-        task: (N,) index of the current task of the program.
-        segment: (N,) index of the segment of its plan, -1 for none.
-        sigma: (N,) place on the path of that segment, from 0 to 1.
-        tools: (N,) the tool frame.
-        water: (N,) the water, None without water.
-        margin: (N,) height of the cup's lip above the water [m]; infinite without water.
-    """
-
-    t: FloatArray
-    q: FloatArray
-    qd: FloatArray
-    sent: FloatArray
-    measured: FloatArray | None
-    fingers: FloatArray
-    task: IntArray
-    segment: IntArray
-    sigma: FloatArray
-    tools: tuple[str, ...]
-    water: tuple[MotionWithWater | None, ...]
-    margin: FloatArray
 
 
 def simulated(
@@ -102,13 +68,13 @@ def follow_exactly(state: State) -> State:
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A complete run of a program.
+    """A complete run of a program, of N ticks, the first before anything moves.
 
     Attributes:
         program: the program.
         session: the rules of the arm.
         run: the run at its end.
-        states: (N,) the states of all ticks, the first before anything moves.
+        states: (N,) the states of all ticks.
         tasks: (N,) index of the current task at each.
     """
 
@@ -116,46 +82,45 @@ class Simulation:
     session: Session
     run: Run
     states: tuple[State, ...]
-    tasks: tuple[int, ...]
+    tasks: IntArray
 
     @property
-    def trace(self) -> Trace:
-        """The trace of the run."""
-        states = self.states
-        places = [self._place(*tick) for tick in zip(states, self.tasks, strict=True)]
-        q = np.array([state.q for state in states])
-        setpoints = np.array([state.setpoint for state in states])
-        measured = q if states[-1].report is not None else None
-        return Trace(
-            t=np.array([state.t for state in states]),
-            q=setpoints,
-            qd=np.array([state.motion.qd for state in states]),
-            sent=q if measured is None else setpoints,
-            measured=measured,
-            fingers=np.array([state.gripper for state in states]),
-            task=np.array(self.tasks, dtype=np.int64),
-            segment=np.array([segment for segment, _ in places], dtype=np.int64),
-            sigma=np.array([sigma for _, sigma in places]),
-            tools=tuple(state.tool for state in states),
-            water=tuple(state.poured for state in states),
-            margin=np.array([self._margin(state) for state in states]),
-        )
+    def arm(self) -> ArmModel:
+        """The arm model."""
+        return self.session.require_arm()
+
+    @cached_property
+    def t(self) -> FloatArray:
+        """The times (N,) [s]."""
+        return np.array([state.t for state in self.states])
+
+    @cached_property
+    def q(self) -> FloatArray:
+        """The setpoints (N, n) [rad]."""
+        return np.array([state.setpoint for state in self.states])
+
+    @cached_property
+    def qd(self) -> FloatArray:
+        """The velocities (N, n) of the setpoints [rad/s]."""
+        return np.array([state.motion.qd for state in self.states])
+
+    @cached_property
+    def measured(self) -> FloatArray | None:
+        """The measured joints (N, n) [rad]; None for an arm that follows exactly."""
+        if self.states[-1].report is None:
+            return None
+        return np.array([state.q for state in self.states])
+
+    @cached_property
+    def margin(self) -> FloatArray:
+        """The height (N,) of the cup's lip above the water [m]; infinite without water."""
+        return np.array([self._margin(state) for state in self.states])
 
     def _margin(self, state: State) -> float:
         pouring = self.session.pouring
         if pouring is None or state.poured is None:
             return math.inf
         return pouring.margin_to_rim(state.poured, state.objects)
-
-    def _place(self, state: State, number: int) -> tuple[int, float]:
-        following, action = state.following, self.program.tasks[number].action
-        if (
-            following is None
-            or not isinstance(action, FollowPlan)
-            or following.plan is not action.plan
-        ):
-            return -1, 0.0
-        return following.number, following.segment.scaling.pace(following.local).sigma
 
 
 class Planned(NamedTuple):
@@ -230,7 +195,7 @@ def run_by_clock(plan: Planned, driver: Driver | None = None) -> Simulation:
         pass
     if run.phase is not Phase.DONE:
         raise KatanaError(run.why)
-    return Simulation(program, session, run, tuple(states), tuple(tasks))
+    return Simulation(program, session, run, tuple(states), np.array(tasks, dtype=np.int64))
 
 
 TICK = 0.02

@@ -14,11 +14,7 @@ from katana450.arm.control.state.state import Reason, State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
 from katana450.extensions.programs.planning.trajectory_path import CubicSpline
-from katana450.extensions.programs.run.measured_run import (
-    MeasuredRun,
-    commanded_errors,
-    path_of,
-)
+from katana450.extensions.programs.run.measured_run import MeasuredRun, run_errors
 from katana450.extensions.programs.script.measures import MEASURES as REPORTED
 from katana450.extensions.programs.script.measures import (
     OF_A_MEASURED_ARM,
@@ -228,7 +224,8 @@ def scored(
         "stops": float(_begins([state.stopped is not None for state in states])),
         "contacts": float(_begins([_waits_before_contact(state) for state in states])),
     }
-    values["executed_position_error_mm"] = _commanded_error(run)
+    errors = run_errors(run)
+    values["executed_position_error_mm"] = 1e3 * float(errors.max()) if errors.size else None
     measured = MeasuredRun.of(arm, run)
     points = np.empty((0, 3))
     if measured is not None:
@@ -292,16 +289,6 @@ def _tool_points(robot: DescribedRobot, states: Sequence[State]) -> tuple[FloatA
 def _in_base(robot: DescribedRobot, points: FloatArray) -> FloatArray:
     T = robot.robot.require_arm().T_base_shoulder
     return np.asarray(points @ T[:3, :3].T + T[:3, 3])
-
-
-def _commanded_error(states: Sequence[State]) -> float | None:
-    """Return the maximum distance [mm] of the setpoints from the desired paths; None without."""
-    on: dict[int, list[State]] = {}
-    for state in states:
-        if (path := path_of(state)) is not None:
-            on.setdefault(id(path), []).append(state)
-    errors = [commanded_errors(path, rows) for rows in on.values() if (path := path_of(rows[0]))]
-    return 1e3 * float(np.concatenate(errors).max()) if errors else None
 
 
 def _clearance(session: Session, states: Sequence[State]) -> float | None:
