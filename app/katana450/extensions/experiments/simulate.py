@@ -29,7 +29,7 @@ from katana450.extensions.programs.run.simulation import (
 )
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.script.script_scene import begun
-from katana450.extensions.real_arm.plant.axis import profile_named
+from katana450.extensions.real_arm.plant.axis import PROFILES
 from katana450.extensions.real_arm.plant.driver import PlantDriver
 from katana450.extras import MissingExtraError
 from katana450.settings import Settings
@@ -58,7 +58,7 @@ def simulate(script: Script, options: Namespace) -> int:
         return 0
     plant = None
     if options.plant is not None:
-        profile, start = profile_named(options.plant), plan.start
+        profile, start = PROFILES[options.plant], plan.start
         plant = PlantDriver(robot, start.q, start.gripper, profile)
     simulation = run_by_clock(plan, plant)
     for choice in _choices(program, simulation):

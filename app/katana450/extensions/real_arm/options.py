@@ -164,10 +164,9 @@ def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> D
         raise ConfigurationError("--arm-log needs an arm: add --arm URL.")
     if options.plant is None:
         return None
-    from katana450.extensions.real_arm.plant.axis import profile_named
     from katana450.extensions.real_arm.plant.driver import PlantDriver
 
-    return PlantDriver(robot, q, gripper, profile_named(options.plant))
+    return PlantDriver(robot, q, gripper, PROFILES[options.plant])
 
 
 def view_layer(options: Namespace) -> ViewLayer | None:

@@ -17,7 +17,7 @@ from katana450.assembly.log_output import say
 from katana450.extensions.real_arm.codec.codecs import FirmwareCodec
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm, loads_of_robot
 from katana450.extensions.real_arm.emulator.firmware import Firmware
-from katana450.extensions.real_arm.plant.axis import profile_named
+from katana450.extensions.real_arm.plant.axis import PROFILES
 from katana450.platform_support import raise_priority, stop_signals
 from katana450.sdk import listen
 
@@ -196,7 +196,7 @@ def emulate(options: Namespace) -> int:
     for number in stop_signals():
         signal.signal(number, lambda *_: ending.set())
     arm = EmulatedArm(
-        profile_named(options.plant),
+        PROFILES[options.plant],
         loads_of_robot(load()),
         calibrated=options.calibrated,
         calibration_scale=options.calibration_scale,

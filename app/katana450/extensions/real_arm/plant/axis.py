@@ -13,8 +13,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from katana450.errors import InputError
-
 
 @dataclass(frozen=True)
 class PlantProfile:
@@ -87,15 +85,6 @@ KATANA450 = PlantProfile(
 an arm is measured."""
 
 PROFILES: Mapping[str, PlantProfile] = {known.name: known for known in (STIFF, KATANA450)}
-
-
-def profile_named(name: str) -> PlantProfile:
-    """Return the profile ``name``. Raises InputError with the names of all profiles."""
-    profile = PROFILES.get(name)
-    if profile is None:
-        raise InputError(f"There is no plant {name!r}; choose one of: {', '.join(PROFILES)}.")
-    return profile
-
 
 STEP = 0.0025
 """[s] Length of a step."""
