@@ -66,12 +66,6 @@ def authorization_of(connection: HTTPConnection) -> str:
     return connection.headers.get("authorization", "") or (f"Bearer {token}" if token else "")
 
 
-def identity(authenticator: Authenticator, connection: HTTPConnection) -> str | None:
-    """Return the session of ``client_of``."""
-    visitor = client_of(authenticator, connection)
-    return None if visitor is None else visitor.session
-
-
 def reserved(hub: Hub, authenticator: Authenticator, client: Identity, places: int) -> int:
     """Return ``places`` for the driver and for an admin with a link, else 0.
 

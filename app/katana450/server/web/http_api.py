@@ -32,7 +32,7 @@ from katana450.server.service.pending_answer import ARRIVED, PendingAnswer
 from katana450.server.service.people import Connection
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
-from katana450.server.web.admission import address_of, identity
+from katana450.server.web.admission import address_of, client_of
 from katana450.server.web.authenticator import TOKEN_REQUIRED, Authenticator
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
 
@@ -229,7 +229,8 @@ class Api:
         self._hub.recorder.refuse("any", actor_of(identity, CommandChannel.HTTP), error)
 
     def _budget(self, request: Request) -> Budget:
-        return self._budgets.of(identity(self._authenticator, request) or address_of(request))
+        sender = client_of(self._authenticator, request)
+        return self._budgets.of(address_of(request) if sender is None else sender.session)
 
     def _identity(self, request: Request, *, stopping: bool = False) -> Identity:
         headers = request.headers
