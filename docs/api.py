@@ -13,6 +13,7 @@ import msgspec
 
 from katana450.arm.control.commands.act import Act, Request, tag_of
 from katana450.arm.control.commands.checked import field_schema
+from katana450.assembly.gateway import RUNNER
 from katana450.extension import extensions, load
 from katana450.extensions.api_description import documentation
 from katana450.server.api import answers, requests
@@ -205,9 +206,9 @@ def page() -> str:
 
 def added_requests() -> dict[str, tuple[type[Request], ...]]:
     """Return the requests of extensions, by the name of the extension, as a server has them."""
-    parts = sorted(extensions(), key=lambda extension: not extension.runner)
-    classes = {part.name: part.runner or part.handler for part in parts}
-    return {name: load(target).request_types for name, target in classes.items() if target}
+    handlers = {part.name: part.handler for part in extensions() if part.handler}
+    classes = {"programs": RUNNER, **handlers}
+    return {name: load(target).request_types for name, target in classes.items()}
 
 
 def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
