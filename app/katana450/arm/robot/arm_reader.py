@@ -12,10 +12,10 @@ import numpy as np
 
 from katana450.arm.control.objects.gripper_model import NO_GRIPPER, GripperModel
 from katana450.arm.control.tool_kinematics import FiveAxisTool, ToolKinematics
-from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN
+from katana450.arm.robot.link import Joint
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.structure import SLIDING, Structure, structure_of
-from katana450.arm.robot.urdf import Urdf, UrdfJoint, driver_of
+from katana450.arm.robot.urdf import Urdf, driver_of
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import screws, se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -48,7 +48,7 @@ class Fingers:
 
 
 def fingers_of(
-    hand: Sequence[UrdfJoint], others: Sequence[UrdfJoint], frames: Mapping[str, FloatArray]
+    hand: Sequence[Joint], others: Sequence[Joint], frames: Mapping[str, FloatArray]
 ) -> Fingers:
     """Return the gripper made of the movable joints ``hand``.
 
@@ -68,9 +68,9 @@ def fingers_of(
     if drivable:
         lead, *rest = drivable
         follow = {lead.name: (1.0, 0.0)} | {j.name: _with_lead(lead, j, frames) for j in rest}
-        speed = min(_speed(j) / abs(follow[j.name][0]) for j in drivable)
+        speed = min(j.speed / abs(follow[j.name][0]) for j in drivable)
         lower, upper = _range(lead)
-        gripper = GripperModel(lower, upper, speed, slides=lead.type == SLIDING)
+        gripper = GripperModel(lower, upper, speed, slides=lead.slides)
     by_name = {joint.name: joint for joint in (*hand, *others)}
     notes = []
     for joint in hand:
@@ -86,12 +86,12 @@ def fingers_of(
         if joint.name not in follow:
             value = _at_rest(joint)
             resting[joint.name] = value
-            place = "zero" if value == 0.0 else f"{value:g} {_unit(joint)}"
+            place = "zero" if value == 0.0 else f"{value:g} {'m' if joint.slides else 'rad'}"
             notes.append(f"Joint {joint.name!r} is {joint.type} and stays at {place}.")
     return Fingers(gripper, follow, tuple(j.name for j in drivable), resting, tuple(notes))
 
 
-def _range(joint: UrdfJoint) -> tuple[float, ...]:
+def _range(joint: Joint) -> tuple[float, ...]:
     """Return both limits [rad or m] of a joint with a range between them, else an empty tuple."""
     if joint.type not in ("revolute", SLIDING) or joint.limit is None:
         return ()
@@ -100,19 +100,7 @@ def _range(joint: UrdfJoint) -> tuple[float, ...]:
     return (lower, upper) if -math.inf < lower < upper < math.inf else ()
 
 
-def _speed(joint: UrdfJoint) -> float:
-    """Return the speed of ``joint`` [rad/s or m/s]."""
-    speed = None if joint.limit is None else joint.limit.velocity
-    if speed is None or not 0.0 < speed < math.inf:
-        return SLOW_SLIDE if joint.type == SLIDING else SLOW_TURN
-    return float(speed)
-
-
-def _unit(joint: UrdfJoint) -> str:
-    return "m" if joint.type == SLIDING else "rad"
-
-
-def _at_rest(joint: UrdfJoint) -> float:
+def _at_rest(joint: Joint) -> float:
     """Return zero, or the limit nearest to it."""
     if joint.mimic is not None or not _range(joint):
         return 0.0
@@ -120,9 +108,7 @@ def _at_rest(joint: UrdfJoint) -> float:
     return min(max(0.0, lower), upper)
 
 
-def _with_lead(
-    lead: UrdfJoint, joint: UrdfJoint, frames: Mapping[str, FloatArray]
-) -> tuple[float, float]:
+def _with_lead(lead: Joint, joint: Joint, frames: Mapping[str, FloatArray]) -> tuple[float, float]:
     """Return factor and offset of a driven finger that closes when ``lead`` does."""
     low, high = _range(lead)
     lower, upper = _range(joint)
@@ -239,7 +225,7 @@ def described_chain(
         S=np.column_stack([_screw(j, T_shoulder_base @ frames[j.child]) for j in joints]),
         lower=np.array([_limit(joint, "lower") for joint in joints]),
         upper=np.array([_limit(joint, "upper") for joint in joints]),
-        speed=np.array([_speed(joint) for joint in joints]),
+        speed=np.array([joint.speed for joint in joints]),
         names=tuple(joint.name for joint in joints),
     )
     return chain, T_base_shoulder
@@ -255,14 +241,14 @@ def _gripper_note(fingers: Fingers, tool: str) -> str:
     )
 
 
-def _shoulder_frame(frames: Mapping[str, FloatArray], joints: Sequence[UrdfJoint]) -> FloatArray:
+def _shoulder_frame(frames: Mapping[str, FloatArray], joints: Sequence[Joint]) -> FloatArray:
     """Return {S}: the link of that name, else parallel to the root where axis 1 passes axis 2.
 
     A rail or a lift before these axes does not count.
     """
     if SHOULDER_FRAME in frames:
         return frames[SHOULDER_FRAME]
-    turning = [joint for joint in joints if joint.type != SLIDING]
+    turning = [joint for joint in joints if not joint.slides]
     one, two = (_screw(joint, frames[joint.child]) for joint in turning[:2])
     p1, p2 = screws.point_on(one), screws.point_on(two)
     # The foot on axis 1 of the common normal of the two lines.
@@ -272,11 +258,11 @@ def _shoulder_frame(frames: Mapping[str, FloatArray], joints: Sequence[UrdfJoint
     return se3.from_rotation_translation(np.eye(3), p1 + along * one[:3])
 
 
-def _screw(joint: UrdfJoint, T_shoulder_child: FloatArray) -> FloatArray:
+def _screw(joint: Joint, T_shoulder_child: FloatArray) -> FloatArray:
     """Return the joint's screw axis (6,) in {S}; the axis passes through its child's origin."""
     direction = T_shoulder_child[:3, :3] @ joint.axis
     try:
-        if joint.type == SLIDING:
+        if joint.slides:
             return screws.prismatic(direction)
         return screws.revolute(direction, T_shoulder_child[:3, 3])
     except InputError as error:
@@ -285,7 +271,7 @@ def _screw(joint: UrdfJoint, T_shoulder_child: FloatArray) -> FloatArray:
         ) from error
 
 
-def _limit(joint: UrdfJoint, which: str) -> float:
+def _limit(joint: Joint, which: str) -> float:
     if joint.type == "continuous" and which in ("lower", "upper"):
         return math.pi if which == "upper" else -math.pi
     value = None if joint.limit is None else getattr(joint.limit, which)

@@ -7,11 +7,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from katana450.arm.robot.surfaces import VisualMesh, main_colour, shapes_of
-from katana450.arm.robot.urdf import Inertial
 from katana450.arm.robot.visual import Visual
 from katana450.caching import cached_property
 from katana450.maths.geometry import se3, so3
@@ -21,40 +21,115 @@ SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
 """[rad/s, m/s] Speed of a joint if its file states none."""
 
 
+class JointLimit(NamedTuple):
+    """Limits [rad, m], maximum speed [rad/s, m/s] and force [N m, N] of a joint, where stated."""
+
+    lower: float | None
+    upper: float | None
+    velocity: float | None
+    effort: float | None
+
+
+class Mimic(NamedTuple):
+    """The joint that another follows: value = multiplier * (value of ``joint``) + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """The movable connection of a link to its parent.
+    """The connection of a link to its parent.
 
     Attributes:
         name: of the joint.
-        slides: whether it is prismatic; else it turns.
-        axis: (3,) unit direction in the frame of its link.
-        lower, upper: limits [rad] or [m], infinite if there are none.
-        leader: the joint whose value it follows; its own name if it is driven itself.
-        factor, offset: value = factor * leader + offset.
-        speed: maximum [rad/s] or [m/s], infinite if the file states none.
-        effort: maximum force [N m] or [N], 0 if the file states none.
+        type: one of ``description.JOINTS``.
+        parent, child: names of its links.
+        T_parent_child: (4, 4) pose of the child in the parent at zero [m].
+        axis: (3,) direction in the frame of the child, of unit length unless the file has none.
+        limit: limits, speed and force, if stated.
+        mimic: the joint that it follows directly, if any.
         damping, friction: [N m s/rad, N s/m] and [N m, N], 0 if the file states none.
+        leader: the driven joint whose value it follows; its own name if it is driven itself.
+        factor, offset: value = factor * leader + offset.
     """
 
     name: str
-    slides: bool
+    type: str
+    parent: str
+    child: str
+    T_parent_child: FloatArray
     axis: FloatArray
-    lower: float
-    upper: float
-    leader: str
+    limit: JointLimit | None
+    mimic: Mimic | None
+    damping: float
+    friction: float
+    leader: str = ""
     factor: float = 1.0
     offset: float = 0.0
-    speed: float = math.inf
-    effort: float = 0.0
-    damping: float = 0.0
-    friction: float = 0.0
+
+    @property
+    def slides(self) -> bool:
+        """True if it is prismatic; else it turns."""
+        return self.type == "prismatic"
+
+    @property
+    def lower(self) -> float:
+        """Lower limit [rad] or [m], infinite if there is none."""
+        lower = None if self.limit is None or self.type == "continuous" else self.limit.lower
+        return -math.inf if lower is None else lower
+
+    @property
+    def upper(self) -> float:
+        """Upper limit [rad] or [m], infinite if there is none."""
+        upper = None if self.limit is None or self.type == "continuous" else self.limit.upper
+        return math.inf if upper is None else upper
+
+    @property
+    def has_speed(self) -> bool:
+        """True if the file states a maximum speed."""
+        return self.limit is not None and 0.0 < (self.limit.velocity or 0.0) < math.inf
+
+    @property
+    def speed(self) -> float:
+        """Maximum speed [rad/s] or [m/s], a slow one if the file states none."""
+        if self.limit is not None and self.has_speed:
+            return float(self.limit.velocity or 0.0)
+        return SLOW_SLIDE if self.slides else SLOW_TURN
+
+    @property
+    def effort(self) -> float:
+        """Maximum force [N m] or [N], 0 if the file states none."""
+        return 0.0 if self.limit is None else self.limit.effort or 0.0
 
     def motion(self, value: float) -> FloatArray:
         """Return the pose (4, 4) that the joint adds at ``value`` [rad] or [m]."""
         if self.slides:
             return se3.from_rotation_translation(np.eye(3), value * self.axis)
         return se3.from_rotation_translation(so3.exp(value * self.axis), np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """The mass of a link.
+
+    Attributes:
+        mass: [kg], above 0.
+        T_link_inertia: (4, 4) pose of the frame of ``moments``, its origin the centre of mass [m].
+        moments: (3, 3) inertia [kg m^2].
+    """
+
+    mass: float
+    T_link_inertia: FloatArray
+    moments: FloatArray
+
+    @property
+    def principal(self) -> tuple[FloatArray, FloatArray]:
+        """The principal moments (3,) [kg m^2], and their right-handed axes (3, 3) in the link."""
+        values, axes = np.linalg.eigh(self.moments)
+        axes = axes * np.sign(np.linalg.det(axes))
+        return values, self.T_link_inertia[:3, :3] @ axes
 
 
 @dataclass(frozen=True, eq=False)

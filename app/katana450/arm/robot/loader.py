@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from katana450.arm.robot.arm_reader import FindArm, arm_in
 from katana450.arm.robot.description import checked, explained, unexpanded
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.urdf import Urdf, UrdfJoint, driver_of, urdf_of
+from katana450.arm.robot.urdf import Urdf, driver_of, urdf_of
 from katana450.arm.robot.visual import rods
 from katana450.errors import RobotDescriptionError
-from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 
-MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
-"""Supported types of movable joints, and whether each slides."""
+MOVABLE = ("revolute", "continuous", "prismatic")
+"""Supported types of movable joints."""
 
 
 def load(
@@ -64,73 +61,49 @@ def load(
 def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]]:
     """Return the tree, parents first, and sentences on its joints that cannot be moved."""
     above = {joint.child: joint for joint in urdf.joints.values()}
-    readable: dict[str, UrdfJoint] = {}
-    joints: dict[str, Joint] = {}
+    readable: dict[str, Joint] = {}
     faults: list[str] = []
-    for described in urdf.joints.values():
-        try:
-            if described.type != "fixed":
-                joints[described.name] = _joint(path, described)
-                readable[described.name] = described
-        except RobotDescriptionError as error:
-            faults.append(str(error))
+    for joint in urdf.joints.values():
+        fault = _fault(path, joint)
+        if fault:
+            faults.append(fault)
+        elif joint.type != "fixed":
+            readable[joint.name] = joint
     following: dict[str, Joint] = {}
-    for name, described in readable.items():
-        leader = driver_of(described, readable)
-        if leader is not None:
-            named, factor, offset = leader
-            following[name] = replace(joints[name], leader=named, factor=factor, offset=offset)
-        elif described.mimic is not None:
+    for name, joint in readable.items():
+        driver = driver_of(joint, readable)
+        if driver is not None:
+            leader, factor, offset = driver
+            following[name] = replace(joint, leader=leader, factor=factor, offset=offset)
+        elif joint.mimic is not None:
             faults.append(
-                f"Joint {name!r} of {path.name} mimics {described.mimic.joint!r}, which is not "
+                f"Joint {name!r} of {path.name} mimics {joint.mimic.joint!r}, which is not "
                 "driven and follows no driven joint. Name a driven joint in its <mimic>."
             )
     below: dict[str, list[FloatArray]] = {name: [] for name in urdf.links}
-    for described in urdf.joints.values():
-        below[described.parent].append(described.origin[:3, 3])
+    for joint in urdf.joints.values():
+        below[joint.parent].append(joint.T_parent_child[:3, 3])
     links = []
     for name in urdf.parents_first():
         link, parent_joint = urdf.links[name], above.get(name)
-        links.append(
-            Link(
-                name=name,
-                parent=None if parent_joint is None else parent_joint.parent,
-                T_parent_link=frozen(np.eye(4)) if parent_joint is None else parent_joint.origin,
-                joint=None if parent_joint is None else following.get(parent_joint.name),
-                visuals=link.visuals or rods(below[name]),
-                collisions=link.collisions,
-                inertial=link.inertial,
-                missing=link.missing,
+        if parent_joint is not None:
+            link = replace(
+                link,
+                parent=parent_joint.parent,
+                T_parent_link=parent_joint.T_parent_child,
+                joint=following.get(parent_joint.name),
             )
-        )
+        links.append(replace(link, visuals=link.visuals or rods(below[name])))
     return tuple(links), tuple(faults)
 
 
-def _joint(path: Path, joint: UrdfJoint) -> Joint:
+def _fault(path: Path, joint: Joint) -> str:
+    """Return a sentence on why ``joint`` cannot be read; empty if it can."""
+    if joint.type == "fixed":
+        return ""
     if joint.type not in MOVABLE:
-        raise RobotDescriptionError(
+        return (
             f"Joint {joint.name!r} of {path.name} is {joint.type}, which is not supported. Change "
             f"its type to one of fixed, {', '.join(MOVABLE)}."
         )
-    size = float(np.linalg.norm(joint.axis))
-    if not 0.0 < size < math.inf:
-        raise RobotDescriptionError(f"Joint {joint.name!r} of {path.name} has no axis.")
-    lower, upper, speed, effort = -math.inf, math.inf, math.inf, 0.0
-    if joint.limit is not None:
-        if joint.type != "continuous":
-            lower = lower if joint.limit.lower is None else joint.limit.lower
-            upper = upper if joint.limit.upper is None else joint.limit.upper
-        speed = speed if joint.limit.velocity is None else joint.limit.velocity
-        effort = joint.limit.effort or 0.0
-    return Joint(
-        name=joint.name,
-        slides=MOVABLE[joint.type],
-        axis=frozen(joint.axis / size),
-        lower=lower,
-        upper=upper,
-        leader=joint.name,
-        speed=speed,
-        effort=effort,
-        damping=joint.damping,
-        friction=joint.friction,
-    )
+    return "" if joint.axis.any() else f"Joint {joint.name!r} of {path.name} has no axis."

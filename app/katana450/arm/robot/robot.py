@@ -12,7 +12,7 @@ import numpy as np
 
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.state.messages import axis_label, axis_names
-from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN, Joint, Link
+from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.visual import Visual
 from katana450.caching import cached_property
@@ -232,7 +232,7 @@ class Robot:
             slides=tuple(joint.slides for joint in driven),
             lower=frozen(ranges[:, 0]),
             upper=frozen(ranges[:, 1]),
-            speed=frozen([_speed(joint) for joint in driven]),
+            speed=frozen([joint.speed for joint in driven]),
             why=self.why,
         )
 
@@ -250,10 +250,10 @@ class Robot:
         """Sentences for a person on assumptions about the driven joints."""
         driven = [self.joints[name] for name in self.driven]
         slow = tuple(
-            f"Joint {joint.name!r} has no speed in its file; it gets {_speed(joint):g} "
+            f"Joint {joint.name!r} has no speed in its file; it gets {joint.speed:g} "
             f"{'m/s' if joint.slides else 'rad/s'}."
             for joint in driven
-            if _speed(joint) != joint.speed
+            if not joint.has_speed
         )
         return slow + tuple(
             f"The limits of the joints that follow {joint.name!r} exclude each other, so only its "
@@ -289,10 +289,3 @@ class Robot:
                 f"{high:g}. Set the lower below the upper limit."
             )
         return low, high
-
-
-def _speed(joint: Joint) -> float:
-    """Return the speed of ``joint`` [rad/s] or [m/s], a slow one if none is stated."""
-    if 0.0 < joint.speed < math.inf:
-        return joint.speed
-    return SLOW_SLIDE if joint.slides else SLOW_TURN

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from katana450.arm.robot.urdf import Urdf, UrdfJoint, driver_of
+from katana450.arm.robot.link import Joint
+from katana450.arm.robot.urdf import Urdf, driver_of
 from katana450.errors import RobotDescriptionError
 
 TOOL_FRAMES = (
@@ -63,11 +64,11 @@ class Structure:
         others: every other movable joint.
     """
 
-    axes: tuple[UrdfJoint, ...]
+    axes: tuple[Joint, ...]
     tools: tuple[str, ...]
     chosen: bool
-    hand: tuple[UrdfJoint, ...]
-    others: tuple[UrdfJoint, ...]
+    hand: tuple[Joint, ...]
+    others: tuple[Joint, ...]
 
 
 def structure_of(
@@ -115,7 +116,7 @@ class _Tree:
     def __init__(self, urdf: Urdf) -> None:
         self._above = {joint.child: joint for joint in urdf.joints.values()}
         self.joints = urdf.joints
-        self.below: dict[str, list[UrdfJoint]] = {}
+        self.below: dict[str, list[Joint]] = {}
         for joint in urdf.joints.values():
             self.below.setdefault(joint.parent, []).append(joint)
         self.root = next(link for link in urdf.links if link not in self._above)
@@ -125,15 +126,15 @@ class _Tree:
                 (self._depth[j.child] + _drives(j) for j in self.below.get(link, ())), default=0
             )
 
-    def joints_to(self, link: str) -> list[UrdfJoint]:
+    def joints_to(self, link: str) -> list[Joint]:
         """Return the joints from the root to ``link``, in that order."""
-        joints: list[UrdfJoint] = []
+        joints: list[Joint] = []
         while link in self._above:
             joints.append(self._above[link])
             link = joints[-1].parent
         return joints[::-1]
 
-    def movable_to(self, link: str) -> list[UrdfJoint]:
+    def movable_to(self, link: str) -> list[Joint]:
         """Return the joints from the root to ``link`` that are not fixed."""
         return [joint for joint in self.joints_to(link) if _moves(joint)]
 
@@ -144,7 +145,7 @@ class _Tree:
             links.extend(joint.child for joint in self.below.get(name, ()))
         return links
 
-    def next_joints(self, link: str) -> list[UrdfJoint]:
+    def next_joints(self, link: str) -> list[Joint]:
         """Return the first movable joints behind ``link``, on every branch."""
         joints, waiting = [], list(self.below.get(link, ()))
         for joint in waiting:
@@ -154,7 +155,7 @@ class _Tree:
                 waiting.extend(self.below.get(joint.child, ()))
         return joints
 
-    def depth(self, joint: UrdfJoint) -> int:
+    def depth(self, joint: Joint) -> int:
         """Return the maximum number of consecutive driven joints, beginning with ``joint``."""
         return self._depth[joint.child] + _drives(joint)
 
@@ -164,19 +165,19 @@ def _is_called(link: str, frame: str) -> bool:
     return link == frame or link.endswith((f"_{frame}", f"/{frame}"))
 
 
-def _moves(joint: UrdfJoint) -> bool:
+def _moves(joint: Joint) -> bool:
     return bool(joint.type != "fixed")
 
 
-def _drives(joint: UrdfJoint) -> bool:
+def _drives(joint: Joint) -> bool:
     return _moves(joint) and joint.mimic is None
 
 
-def _carries(joint: UrdfJoint, axes: Sequence[UrdfJoint]) -> bool:
+def _carries(joint: Joint, axes: Sequence[Joint]) -> bool:
     return joint.type in (*TURNING, "fixed") or joint is axes[0]
 
 
-def _is_driven(axes: Sequence[UrdfJoint], count: int | None) -> bool:
+def _is_driven(axes: Sequence[Joint], count: int | None) -> bool:
     """Return whether a tool is driven by ``axes``: they turn, after a rail or a lift at most.
 
     The family, with ``count`` axes, has none.
@@ -185,12 +186,12 @@ def _is_driven(axes: Sequence[UrdfJoint], count: int | None) -> bool:
     return all(joint.type in TURNING for joint in axes[int(slides) :])
 
 
-def _main_axes(tree: _Tree, path: Path, count: int | None) -> list[UrdfJoint]:
+def _main_axes(tree: _Tree, path: Path, count: int | None) -> list[Joint]:
     """Return the axes of the arm in a tree from which fingers and wheels branch off.
 
     Raises RobotDescriptionError with the number of axes if it is not ``count``.
     """
-    axes: list[UrdfJoint] = []
+    axes: list[Joint] = []
     link = tree.root
     while branches := _branches(tree, link, axes):
         deepest, *rest = sorted(branches, key=tree.depth, reverse=True)
@@ -235,17 +236,17 @@ def _main_axes(tree: _Tree, path: Path, count: int | None) -> list[UrdfJoint]:
     return axes
 
 
-def _listed(joints: Iterable[UrdfJoint]) -> str:
+def _listed(joints: Iterable[Joint]) -> str:
     """Return the names of ``joints``, with the type of each that does not turn."""
     return ", ".join(j.name if j.type in TURNING else f"{j.name} ({j.type})" for j in joints)
 
 
-def _branches(tree: _Tree, link: str, axes: Sequence[UrdfJoint]) -> list[UrdfJoint]:
+def _branches(tree: _Tree, link: str, axes: Sequence[Joint]) -> list[Joint]:
     """Return the next joints behind ``link``, without bars of ``axes`` that carry nothing."""
     joints = tree.next_joints(link)
     driven = {joint.name for joint in axes}
 
-    def is_bar(joint: UrdfJoint) -> bool:
+    def is_bar(joint: Joint) -> bool:
         leader = driver_of(joint, tree.joints)
         return joint.mimic is not None and leader is not None and leader.joint in driven
 
@@ -253,7 +254,7 @@ def _branches(tree: _Tree, link: str, axes: Sequence[UrdfJoint]) -> list[UrdfJoi
     return own or joints[:1]
 
 
-def _is_finger(tree: _Tree, joint: UrdfJoint, number: int) -> bool:
+def _is_finger(tree: _Tree, joint: Joint, number: int) -> bool:
     """Return whether the last of ``number`` joints opens a gripper instead of turning it."""
     if joint.mimic is not None or joint.type == "prismatic":
         return True
@@ -268,7 +269,7 @@ def _is_finger(tree: _Tree, joint: UrdfJoint, number: int) -> bool:
     return bool(number > ARM_JOINTS or limit.upper - limit.lower <= JAW_RANGE)
 
 
-def _axes_to(tree: _Tree, tool: str, count: int | None) -> list[UrdfJoint]:
+def _axes_to(tree: _Tree, tool: str, count: int | None) -> list[Joint]:
     """Return the axes that carry ``tool``. Raises RobotDescriptionError if not ``count``."""
     axes = tree.movable_to(tool)
     _refuse_followers(axes, repr(tool))
@@ -287,7 +288,7 @@ def _axes_to(tree: _Tree, tool: str, count: int | None) -> list[UrdfJoint]:
     return axes
 
 
-def _refuse_followers(axes: Sequence[UrdfJoint], what: str) -> None:
+def _refuse_followers(axes: Sequence[Joint], what: str) -> None:
     for joint in axes:
         if joint.mimic is not None:
             raise RobotDescriptionError(

@@ -6,106 +6,26 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from katana450.arm.robot.link import Inertial, Joint, JointLimit, Link, Mimic
 from katana450.arm.robot.visual import GREY, Color, PrimitiveShape, Visual, mesh_file
 from katana450.disk_cache import kept
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 
-class UrdfLimit(NamedTuple):
-    """Limits [rad, m], maximum speed [rad/s, m/s] and force [N m, N] of a joint, where stated."""
-
-    lower: float | None
-    upper: float | None
-    velocity: float | None
-    effort: float | None
-
-
-class UrdfMimic(NamedTuple):
-    """The joint that another follows: value = multiplier * (value of ``joint``) + offset."""
-
-    joint: str
-    multiplier: float
-    offset: float
-
-
-@dataclass(frozen=True, eq=False)
-class UrdfJoint:
-    """An element <joint>.
-
-    Attributes:
-        name: of the joint.
-        type: one of ``description.JOINTS``.
-        parent, child: names of its links.
-        origin: (4, 4) pose of the child in the parent at zero [m].
-        axis: (3,) as stated, in the frame of the child; not normalised.
-        limit: limits and speed, if stated.
-        mimic: the joint that it follows, if any.
-        damping, friction: [N m s/rad, N s/m] and [N m, N], 0 if not stated.
-    """
-
-    name: str
-    type: str
-    parent: str
-    child: str
-    origin: FloatArray
-    axis: FloatArray
-    limit: UrdfLimit | None
-    mimic: UrdfMimic | None
-    damping: float
-    friction: float
-
-
-@dataclass(frozen=True, eq=False)
-class Inertial:
-    """The mass of a link.
-
-    Attributes:
-        mass: [kg], above 0.
-        T_link_inertia: (4, 4) pose of the frame of ``moments``, its origin the centre of mass [m].
-        moments: (3, 3) inertia [kg m^2].
-    """
-
-    mass: float
-    T_link_inertia: FloatArray
-    moments: FloatArray
-
-    @property
-    def principal(self) -> tuple[FloatArray, FloatArray]:
-        """The principal moments (3,) [kg m^2], and their right-handed axes (3, 3) in the link."""
-        values, axes = np.linalg.eigh(self.moments)
-        axes = axes * np.sign(np.linalg.det(axes))
-        return values, self.T_link_inertia[:3, :3] @ axes
-
-
-@dataclass(frozen=True, eq=False)
-class UrdfLink:
-    """An element <link>.
-
-    Attributes:
-        name: of the link.
-        visuals, collisions: its shapes.
-        inertial: its mass, if one is stated.
-        missing: the mesh files of its visuals, and of its collisions, that do not exist.
-    """
-
-    name: str
-    visuals: tuple[Visual, ...]
-    collisions: tuple[Visual, ...]
-    inertial: Inertial | None
-    missing: tuple[tuple[Path, ...], tuple[Path, ...]]
-
-
 @dataclass(frozen=True, eq=False)
 class Urdf:
-    """An element <robot>: its links and joints by name, in the order of the file."""
+    """An element <robot>: its links and joints by name, in the order of the file.
+
+    The links have no parents yet, and the joints no leaders.
+    """
 
     name: str
-    links: Mapping[str, UrdfLink]
-    joints: Mapping[str, UrdfJoint]
+    links: Mapping[str, Link]
+    joints: Mapping[str, Joint]
 
     def frames(self) -> dict[str, FloatArray]:
         """Return the pose (4, 4) of each link in the root with every joint at zero [m]."""
@@ -113,7 +33,9 @@ class Urdf:
         above = {joint.child: joint for joint in self.joints.values()}
         for name in self.parents_first():
             joint = above.get(name)
-            frames[name] = np.eye(4) if joint is None else frames[joint.parent] @ joint.origin
+            frames[name] = (
+                np.eye(4) if joint is None else frames[joint.parent] @ joint.T_parent_child
+            )
         return frames
 
     def parents_first(self) -> list[str]:
@@ -129,7 +51,7 @@ class Urdf:
         return order
 
 
-def driver_of(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> UrdfMimic | None:
+def driver_of(joint: Joint, joints: Mapping[str, Joint]) -> Mimic | None:
     """Return the driven joint among ``joints`` that ``joint`` follows, directly or not.
 
     Multiplier and offset are those of all joints between. A driven joint follows itself. None if
@@ -143,7 +65,7 @@ def driver_of(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> UrdfMimic | 
         factor, offset = factor * joint.mimic.multiplier, factor * joint.mimic.offset + offset
         passed.append(leader.name)
         joint = leader
-    return UrdfMimic(joint.name, factor, offset)
+    return Mimic(joint.name, factor, offset)
 
 
 FILENAME = re.compile(rb"filename\s*=\s*[\"']([^\"']*)[\"']")
@@ -191,7 +113,7 @@ def _read(data: bytes, folder: Path) -> Urdf:
     )
 
 
-def _link(link: Any, colors: Mapping[str | None, Any], folder: Path) -> UrdfLink:
+def _link(link: Any, colors: Mapping[str | None, Any], folder: Path) -> Link:
     missing: tuple[list[Path], list[Path]] = ([], [])
     visuals, collisions = (
         tuple(
@@ -206,20 +128,21 @@ def _link(link: Any, colors: Mapping[str | None, Any], folder: Path) -> UrdfLink
         moments = np.zeros((3, 3)) if link.inertial.inertia is None else link.inertial.inertia
         inertial = Inertial(link.inertial.mass, _origin(link.inertial), frozen(moments))
     lost = tuple(missing[0]), tuple(missing[1])
-    return UrdfLink(link.name, visuals, collisions, inertial, lost)
+    return Link(link.name, None, frozen(np.eye(4)), None, visuals, collisions, inertial, lost)
 
 
-def _joint(joint: Any) -> UrdfJoint:
+def _joint(joint: Any) -> Joint:
     limit, mimic, losses = joint.limit, joint.mimic, joint.dynamics
-    return UrdfJoint(
+    size = float(np.linalg.norm(joint.axis))
+    return Joint(
         name=joint.name,
         type=joint.type,
         parent=joint.parent,
         child=joint.child,
-        origin=_origin(joint),
-        axis=frozen(joint.axis),
-        limit=limit and UrdfLimit(limit.lower, limit.upper, limit.velocity, limit.effort),
-        mimic=mimic and UrdfMimic(mimic.joint, mimic.multiplier, mimic.offset),
+        T_parent_child=_origin(joint),
+        axis=frozen(joint.axis / size if 0.0 < size < np.inf else np.zeros(3)),
+        limit=limit and JointLimit(limit.lower, limit.upper, limit.velocity, limit.effort),
+        mimic=mimic and Mimic(mimic.joint, mimic.multiplier, mimic.offset),
         damping=0.0 if losses is None else losses.damping or 0.0,
         friction=0.0 if losses is None else losses.friction or 0.0,
     )

@@ -15,11 +15,10 @@ from itertools import combinations
 import numpy as np
 
 from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.link import Inertial, Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
-from katana450.arm.robot.urdf import Inertial
 from katana450.arm.robot.visual import PrimitiveShape, Visual
 from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
 from katana450.extensions.export.files import distinct, zipped
