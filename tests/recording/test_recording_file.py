@@ -196,8 +196,8 @@ def test_metadata_and_attachments_tell_what_made_it(file: RecordingFile) -> None
     assert set(RELEVANT) <= set(file.metadata)
     assert not differences(file.metadata)
     assert "unknown" not in (file.metadata["libm_rounding"], file.metadata["blas_rounding"])
-    assert differences({**file.metadata, "blas_core": "Other"}) == [
-        f"blas_core: Other there, {file.metadata['blas_core']} here"
+    assert differences({**file.metadata, "blas_rounding": "Other"}) == [
+        f"blas_rounding: Other there, {file.metadata['blas_rounding']} here"
     ]
     attached = {attachment.name: attachment.data for attachment in file.attachments()}
     assert attached == {"katana450.urdf": URDF_PATH.read_bytes(), "scene.json": b"{}"}

@@ -7,7 +7,6 @@ code, with another order of rounding.
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import math
 import platform
@@ -15,7 +14,7 @@ import secrets
 import struct
 import sys
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -36,12 +35,12 @@ DISTANCES = "distances"
 """Entry that tells what measured the distances of bodies. Recordings by coal or FCL have none."""
 
 RELEVANT = (
-    *("version", "python", "numpy", DISTANCES, "blas", "blas_core", "libc", "machine", "cpu"),
+    *("version", "python", "numpy", DISTANCES, "blas", "libc", "machine", "cpu"),
     *("libm_rounding", "blas_rounding", "numpy_rounding"),
 )
 """Entries that show why a simulation may not give the same bits."""
 
-OF_PROCESS = ("blas_core", "libm_rounding", "blas_rounding", "numpy_rounding")
+OF_PROCESS = ("libm_rounding", "blas_rounding", "numpy_rounding")
 """The entries that depend on the environment variables of the process, not on the machine."""
 
 PROBES = 2000
@@ -62,7 +61,6 @@ def fingerprint() -> dict[str, str]:
         "numpy": np.__version__,
         DISTANCES: f"MuJoCo {metadata.version('mujoco-core')}",
         "blas": _blas(),
-        "blas_core": _blas_core(),
         "libc": " ".join(platform.libc_ver()).strip() or UNKNOWN,
         "machine": f"{sys.platform} {platform.machine()}",
         "cpu": _cpu(),
@@ -121,27 +119,6 @@ def _blas() -> str:
         library = config["Build Dependencies"]["blas"]
         return f"{library['name']} {library['version']}"
     return UNKNOWN
-
-
-def _blas_core() -> str:
-    """Return the kind of processor for which OpenBLAS has chosen its code."""
-    for path in _libraries():
-        with suppress(OSError, AttributeError):
-            library = ctypes.CDLL(str(path))
-            for name in ("scipy_openblas_get_corename64_", "openblas_get_corename"):
-                with suppress(AttributeError):
-                    core = getattr(library, name)
-                    core.restype = ctypes.c_char_p
-                    return str(core().decode())
-    return UNKNOWN
-
-
-def _libraries() -> Iterator[Path]:
-    """Yield the files of OpenBLAS that numpy has loaded."""
-    package = Path(np.__file__).parent
-    for folder in (package.parent / "numpy.libs", package / ".dylibs"):
-        if folder.is_dir():
-            yield from sorted(folder.glob("*openblas*"))
 
 
 def _cpu() -> str:

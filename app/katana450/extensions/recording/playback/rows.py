@@ -162,19 +162,12 @@ def _vessel(water: VesselWaterMessage, T: FloatArray) -> VesselWater:
     return VesselWater(water.name, round(water.volume * MILLILITRE), frozen(T), slosh)
 
 
-class Describer:
-    """Reads the objects and the water of complete states. For one file."""
+def description(reader: TickReader, message: Message) -> Description:
+    """Return that of the complete state in ``message``, by the ``reader`` of its file.
 
-    def __init__(self) -> None:
-        self._reader = TickReader()
-
-    def add_solid(self, message: Message) -> None:
-        """Remember the solid in ``message``, to which objects refer. Raises InputError."""
-        self._reader.add_shared(message)
-
-    def description(self, message: Message) -> Description:
-        """Return that of the complete state in ``message``. Raises InputError."""
-        objects: tuple[SceneObject, ...] = self._reader.field(message, "objects", ())
-        poured: MotionWithWater | None = self._reader.field(message, "poured", None)
-        named = {body.name: body for body in objects}
-        return Description(message.t, named, None if poured is None else poured.water)
+    Raises InputError.
+    """
+    objects: tuple[SceneObject, ...] = reader.field(message, "objects", ())
+    poured: MotionWithWater | None = reader.field(message, "poured", None)
+    named = {body.name: body for body in objects}
+    return Description(message.t, named, None if poured is None else poured.water)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import Message
-from katana450.extensions.recording.files.simulation import content_of
+from katana450.extensions.recording.files.simulation import TickReader, content_of
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     EPISODES,
@@ -24,9 +24,9 @@ from katana450.extensions.recording.playback.chunks import ChunkIndex, ChunkSpan
 from katana450.extensions.recording.playback.marks import Mark, add_marks
 from katana450.extensions.recording.playback.rows import (
     Block,
-    Describer,
     Description,
     RecordedMoment,
+    description,
 )
 
 MAX_PAUSE = 2.0
@@ -101,7 +101,7 @@ class _File:
 
     def __init__(self, path: Path) -> None:
         self.index = ChunkIndex(path)
-        self.describer = Describer()
+        self.reader = TickReader()
         self.marked = 0
         self.marks: list[Mark] = []
         self.starts: list[int] = []
@@ -128,7 +128,7 @@ class _File:
                         raise InputError(
                             f"The shapes in the recording have more than {MAX_SOLID_BYTES} bytes."
                         )
-                    self.describer.add_solid(message)
+                    self.reader.add_shared(message)
             self._searched += 1
 
 
@@ -262,7 +262,7 @@ class PlaybackRun:
         for number in range(place.first, place.last + 1):
             messages = file.index.messages(file.chunks[number], STATE, CHECKPOINTS)
             complete = [message for message in messages if message.topic == CHECKPOINTS]
-            descriptions += map(file.describer.description, complete)
+            descriptions += (description(file.reader, message) for message in complete)
             first = complete[0].number if complete else None
             for message in messages:
                 if message.topic != STATE:
