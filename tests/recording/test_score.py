@@ -111,11 +111,8 @@ def score(path: Path, **options: object) -> Scored:
 def test_line_has_its_length_and_the_measures_of_the_report(line: Path) -> None:
     result = score(line)
     assert result.values["tool_path_mm"] == pytest.approx(60.0, abs=0.05)
-    assert result.t[-1] == pytest.approx(result.values["duration_s"], abs=0.02)
-    assert float(result.speed.max()) == pytest.approx(
-        1e-3 * (result.values["max_tool_speed_mm_s"] or 0.0), rel=0.02
-    )
-    assert np.linalg.norm(result.tool[-1] - result.tool[0]) == pytest.approx(0.06, abs=1e-4)
+    # One rise and fall of the speed.
+    assert result.values["sparc"] == pytest.approx(-1.48, abs=0.02)
     plan = plan_script(parse(LINE), URDF_PATH)
     report = measurements(run_by_clock(plan))
     for name in ("margin_to_limits_deg", "smallest_singular_value", "max_speed_fraction"):
@@ -141,11 +138,9 @@ def test_measured_arm_is_scored_apart_from_its_setpoints(line: Path, tmp_path: P
     assert result.values["tracking_lag_ms"] == pytest.approx(70.0, abs=3.0)
     assert result.values["joint_tracking_error_deg"] == pytest.approx(math.degrees(0.005))
     # 5 mrad about the axis of the base, upwards along which the line leads.
-    radius = float(np.linalg.norm(result.tool[0, :2]))
+    radius = float(np.linalg.norm(katana450.open(path).position[0, :2]))
     assert result.values["measured_position_error_mm"] == pytest.approx(5.0 * radius, rel=0.01)
-    assert not len(exact.measured)
-    sent, turned = (np.arctan2(p[:, 1], p[:, 0]) for p in (result.tool, result.measured[10:]))
-    np.testing.assert_allclose(turned, sent[0] + 0.005, atol=1e-4)
+    assert exact.values["measured_position_error_mm"] is None
 
 
 def test_stops_are_counted(stopped: Path) -> None:
@@ -166,7 +161,7 @@ def test_rest_before_the_first_motion_does_not_count(stopped: Path) -> None:
     result = score(stopped, start=float(moved[rest] - run.start + 0.02))
     lasted = moved[-1] - moved[rest + 1] + PERIOD
     assert result.values["duration_s"] == pytest.approx(lasted, abs=1e-6)
-    assert result.t[-1] == pytest.approx(lasted, abs=0.02)
+    assert (result.values["sparc"] or -9.0) > -1.6
 
 
 @pytest.mark.long

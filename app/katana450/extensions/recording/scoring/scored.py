@@ -140,11 +140,6 @@ class Scored:
         name: name of the recording.
         values: each of MEASURES by its name; None if it does not apply.
         places: final place (3,) of each object in the base frame [m].
-        t: (N,) times from the first motion [s], at equal steps.
-        tool: (N, 3) the tool point in the base frame [m].
-        speed: (N,) its speed [m/s].
-        measured: (M, 3) the tool point as measured, in the base frame [m]; none for an arm that
-            follows exactly.
         missing: names of the objects that have a target and are not in the recording. The placing
             error is then unknown.
     """
@@ -152,10 +147,6 @@ class Scored:
     name: str
     values: Mapping[str, float | None]
     places: Places
-    t: FloatArray
-    tool: FloatArray
-    speed: FloatArray
-    measured: FloatArray
     missing: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -200,7 +191,7 @@ def scored(
     # An arm at rest makes no ticks, so the state before the first motion may be much older.
     first_t = max(states[begin].t, states[begin + 1].t - 1.0 / RATE)
     run = [replace(states[begin], t=first_t), *states[begin + 1 : stop + 1]]
-    t, tool = _tool_points(robot, run)
+    tool = _tool_points(robot, run)
     velocity = np.gradient(tool, 1.0 / RATE, axis=0)
     speed = np.linalg.norm(velocity, axis=1)
     places = _places(session, states[-1])
@@ -227,17 +218,13 @@ def scored(
     errors = run_errors(run)
     values["executed_position_error_mm"] = 1e3 * float(errors.max()) if errors.size else None
     measured = MeasuredRun.of(arm, run)
-    points = np.empty((0, 3))
     if measured is not None:
         values |= measured.values
-        points = _in_base(robot, forward_batch(arm.chain, measured.q)[:, :3, 3])
     water = states[-1].poured
     if water is not None and water.water.total:
         values |= water_measures(water.water, water.course)
     missing = tuple(sorted((targets or {}).keys() - places.keys()))
-    return Scored(
-        name, values, places, frozen(t), frozen(tool), frozen(speed), frozen(points), missing
-    )
+    return Scored(name, values, places, missing)
 
 
 def _check_same(file: RecordingFile, states: Sequence[State], first: float, last: float) -> None:
@@ -265,8 +252,8 @@ def _moving(states: Sequence[State]) -> tuple[int, int] | None:
     return (int(moved[0]), int(moved[-1]) + 1) if len(moved) else None
 
 
-def _tool_points(robot: DescribedRobot, states: Sequence[State]) -> tuple[FloatArray, FloatArray]:
-    """Return times (N,) from 0 [s] and the default tool's points (N, 3) in the base frame [m]."""
+def _tool_points(robot: DescribedRobot, states: Sequence[State]) -> FloatArray:
+    """Return the points (N, 3) [m] of the default tool in the base frame, at the RATE."""
     arm = robot.session.require_arm()
     points = forward_batch(arm.chain, np.array([state.setpoint for state in states]))[:, :3, 3]
     times = np.array([state.t for state in states])
@@ -283,12 +270,8 @@ def _tool_points(robot: DescribedRobot, states: Sequence[State]) -> tuple[FloatA
     points = np.concatenate((points, points[numbers]))[order]
     t = np.arange(0.0, times[-1] + 0.5 / RATE, 1.0 / RATE)
     positions = CubicSpline(times, points).values_at(np.minimum(t, times[-1]))
-    return t, _in_base(robot, positions)
-
-
-def _in_base(robot: DescribedRobot, points: FloatArray) -> FloatArray:
     T = robot.robot.require_arm().T_base_shoulder
-    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+    return np.asarray(positions @ T[:3, :3].T + T[:3, 3])
 
 
 def _clearance(session: Session, states: Sequence[State]) -> float | None:
