@@ -45,6 +45,6 @@ def upload_routes(context: RouteContext) -> list[BaseRoute]:
     def make() -> list[BaseRoute]:
         from katana450.extensions.importers.uploads import Uploads
 
-        return Uploads(context.hub, context.authenticator, context.identity).routes()
+        return Uploads(context).routes()
 
     return LateRoutes([f"{ROOT}/mesh", f"{ROOT}/scene"], make).routes()

@@ -8,7 +8,6 @@ import threading
 from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
-from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
@@ -29,11 +28,9 @@ from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
-from katana450.server.service.identity import Identity
 from katana450.server.service.limits import ConnectionLimit, SenderBuckets
 from katana450.server.service.participants import actor_of
 from katana450.server.web.admission import client_of, reserved
-from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import (
     NOT_NOW,
     NOT_UNDERSTOOD,
@@ -42,6 +39,7 @@ from katana450.server.web.bodies import (
     as_json,
     body_of,
 )
+from katana450.server.web.http_api import RouteContext
 
 
 def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
@@ -108,25 +106,15 @@ UPLOAD_TIMEOUT = 60.0
 MIN_RATE = 20_000.0
 """Minimum mean rate of an upload [bytes/s], so that nobody keeps a place by dripping."""
 
-NOT_ALLOWED = 403
-"""HTTP status of a refusal for lack of rights."""
-
 T = TypeVar("T")
 
 
 class Uploads:
     """The HTTP routes for files. An upload is stored for a while, under a key."""
 
-    def __init__(
-        self, hub: Hub, authenticator: Authenticator, identity: Callable[[Request], Identity]
-    ) -> None:
-        """Prepare the routes.
-
-        ``identity`` returns the identity of a request, or raises HTTPException to refuse it.
-        """
-        self._hub = hub
-        self._authenticator = authenticator
-        self._identity = identity
+    def __init__(self, context: RouteContext) -> None:
+        """Prepare the routes."""
+        self._context, self._hub = context, context.hub
         self._often = SenderBuckets(RATE, UPLOAD_BURST, MAX_SENDERS)
         self._reading = asyncio.Lock()
         self._places = ConnectionLimit(WAITING, WAITING_EACH)
@@ -171,7 +159,7 @@ class Uploads:
         return await self._answered(request, keep)
 
     async def _save(self, request: Request) -> Response:
-        self._identity(request)
+        self._context.identity(request)
         try:
             arm = self._hub.present()
             content = await asyncio.to_thread(zipped, self._hub, arm)
@@ -184,14 +172,12 @@ class Uploads:
         self, request: Request, keep: Callable[[], Awaitable[answers.Answer]]
     ) -> Response:
         """Return the answer of ``keep`` as a response, if role and limits allow the upload."""
-        sender = self._identity(request)
-        if not sender.role.may_drive:
-            raise HTTPException(NOT_ALLOWED, "Your role may watch, but not upload files.")
+        sender = self._context.driver(request, "upload files")
         what = {"path": request.url.path, "name": request.query_params.get("name")}
         self._hub.recorder.note("upload", actor_of(sender, CommandChannel.HTTP), what)
-        client = client_of(self._authenticator, request)
+        client = client_of(self._context.authenticator, request)
         assert client is not None
-        places = reserved(self._hub, self._authenticator, client, RESERVED)
+        places = reserved(self._hub, self._context.authenticator, client, RESERVED)
         with self._places.taken(client.session, places) as free:
             if not free or not self._often.take(client.session, self._hub.clock()):
                 why = "Too many files at once. Wait a moment."

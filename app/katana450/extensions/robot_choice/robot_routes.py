@@ -8,7 +8,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import msgspec
-from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
@@ -32,8 +31,6 @@ UPLOAD_SECONDS, MIN_RATE = 60.0, 20_000.0
 
 UPLOADS_PER_SECOND, BURST = 0.2, 5.0
 """Robots that are uploaded per second, and in a burst, by all people together."""
-
-NOT_ALLOWED = 403
 
 ARGUMENT = re.compile(rb"""<xacro:arg\s+name\s*=\s*["']([\w.-]+)["']([^>]*)""")
 DEFAULT = re.compile(rb"""default\s*=\s*["']([^"']*)["']""")
@@ -111,9 +108,7 @@ def routes(context: RouteContext) -> list[BaseRoute]:
         return Response(msgspec.json.encode(answer), media_type="application/json")
 
     async def upload(request: Request) -> Response:
-        sender = context.identity(request)
-        if not sender.role.may_drive:
-            raise HTTPException(NOT_ALLOWED, "Your role may watch, but not upload files.")
+        sender = context.driver(request, "upload files")
         if not uploads.take(hub.clock()):
             return as_json(answers.Refused(why="Too many files. Wait a moment."), TOO_MANY)
         name, main = (request.query_params.get(key, "")[:200] for key in ("name", "main"))

@@ -71,6 +71,16 @@ class RouteContext(NamedTuple):
     budgets: Budgets
     options: Namespace
 
+    def driver(self, request: Request, act: str) -> Identity:
+        """Return the identity of a sender who may drive, and so may ``act``.
+
+        ``act``: verb and object, as in "open files". Raises HTTPException.
+        """
+        sender = self.identity(request)
+        if not sender.role.may_drive:
+            raise HTTPException(403, f"Your role may watch, but not {act}.")
+        return sender
+
 
 RouteProvider = Callable[[RouteContext], list[BaseRoute]]
 """Function that returns the routes of an extension."""

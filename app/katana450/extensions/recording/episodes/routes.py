@@ -87,8 +87,7 @@ class EpisodeRoutes:
 
     async def _file(self, request: Request) -> Response:
         """Return the file of an episode."""
-        if not self._context.identity(request).role.may_drive:
-            raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not record.")
+        self._context.driver(request, "record")
         number = request.path_params["number"]
         path = self._read.path(number)
         if number > MAX_NUMBER or not path.exists():
@@ -97,11 +96,7 @@ class EpisodeRoutes:
 
     async def _request(self, request: Request) -> Response:
         """Execute the request in the body, and return the episode."""
-        sender = self._context.identity(request)
-        if not sender.role.may_drive:
-            raise HTTPException(
-                HTTPStatus.FORBIDDEN, "Your role may watch, but not record episodes."
-            )
+        sender = self._context.driver(request, "record episodes")
         body = await body_of(request, MAX_REQUEST_BYTES)
         actor = actor_of(sender, CommandChannel.HTTP)
         page = request.query_params.get("page", "")

@@ -193,7 +193,7 @@ class RecordingRoutes:
 
     async def _made(self, request: Request, make: str) -> RecordingJob:
         """Return the job that has made the file. Raises HTTPException."""
-        self._check(request, "record")
+        self._context.driver(request, "record")
         task = job_task(self._store, request.query_params, make, self._urdf)
         if self._working.locked():
             raise HTTPException(TOO_MANY, "Another recording is being made. Wait a moment.")
@@ -214,7 +214,7 @@ class RecordingRoutes:
 
     async def _begin(self, request: Request) -> Response:
         """Begin a job, and return its name."""
-        self._check(request, "export")
+        self._context.driver(request, "export")
         do = request.query_params.get("do", "")
         if do != VERIFY and do not in FORMATS:
             known = ", ".join((VERIFY, *FORMATS))
@@ -250,15 +250,11 @@ class RecordingRoutes:
         return Response(status_code=HTTPStatus.NO_CONTENT)
 
     def _job(self, request: Request) -> RecordingJob:
-        self._check(request, "export")
+        self._context.driver(request, "export")
         job = self._jobs.get(request.path_params["name"])
         if job is None:
             raise HTTPException(HTTPStatus.NOT_FOUND, "The server no longer has that result.")
         return job
-
-    def _check(self, request: Request, act: str) -> None:
-        if not self._context.identity(request).role.may_drive:
-            raise HTTPException(HTTPStatus.FORBIDDEN, f"Your role may watch, but not {act}.")
 
 
 class _Download(FileResponse):

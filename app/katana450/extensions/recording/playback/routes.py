@@ -208,9 +208,7 @@ class PlaybackRoutes:
 
     async def _open(self, request: Request) -> Response:
         """Receive a file, and return the name of its recording."""
-        sender = self._context.identity(request)
-        if not sender.role.may_drive:
-            raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not open files.")
+        sender = self._context.driver(request, "open files")
         if self._receiving.locked():
             raise HTTPException(TOO_MANY, "Another file is being opened. Wait a moment.")
         actor = actor_of(sender, CommandChannel.HTTP)
@@ -246,9 +244,10 @@ class PlaybackRoutes:
 
     def _run(self, request: Request, name: str) -> AnyRun:
         """Return the recording ``name`` for the sender of ``request``. Raises HTTPException."""
-        sender = self._context.identity(request)
-        if name != RING and not sender.role.may_drive:
-            raise HTTPException(HTTPStatus.FORBIDDEN, "Your role may watch, but not open files.")
+        if name == RING:
+            self._context.identity(request)
+        else:
+            self._context.driver(request, "open files")
         try:
             return self._store.run(name)
         except InputError as error:
