@@ -1,4 +1,4 @@
-"""Atomic writing of files: each file is written completely or not at all."""
+"""Reading and atomic writing of files: each one is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -13,6 +13,18 @@ from katana450.errors import InputError
 from katana450.platform_support import create_file
 
 Writer = Callable[[BinaryIO], object]
+
+
+def bytes_of(path: Path, maximum: int = -1) -> bytes:
+    """Return the file at ``path``, or with a ``maximum`` up to one byte more than that.
+
+    Raises InputError.
+    """
+    try:
+        with path.open("rb") as file:
+            return file.read(-1 if maximum < 0 else maximum + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
 
 
 def writer_of(content: bytes) -> Writer:

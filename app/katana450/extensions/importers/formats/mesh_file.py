@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from pathlib import Path
 
 import numpy as np
 
@@ -69,15 +68,6 @@ def read_mesh(
         f"{shape.text} {_counted(shape, body)}",
         shape.scale,
     )
-
-
-def content_of(path: Path, maximum: int) -> bytes:
-    """Return up to ``maximum`` + 1 bytes of the file at ``path``. Raises InputError."""
-    try:
-        with path.open("rb") as file:
-            return file.read(maximum + 1)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
 
 
 def unit_of(sign: str) -> float:

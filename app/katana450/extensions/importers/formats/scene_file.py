@@ -19,6 +19,7 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.object_meshes import Mesh
+from katana450.atomic import bytes_of
 from katana450.errors import InputError
 from katana450.extensions.importers.archive import (
     MAX_ARCHIVE_BYTES,
@@ -26,7 +27,7 @@ from katana450.extensions.importers.archive import (
     contents,
     packed,
 )
-from katana450.extensions.importers.formats.mesh_file import content_of, read_mesh
+from katana450.extensions.importers.formats.mesh_file import read_mesh
 from katana450.extensions.importers.formats.shape_file import Format, Up
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import MAX_BYTES, Problem, ScriptError
@@ -192,12 +193,12 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
         file = (folder / name).resolve()
         if not file.is_relative_to(folder):
             raise InputError(f"{name} is not in the folder of the scene.")
-        return content_of(file, maximum)
+        return bytes_of(file, maximum)
 
     try:
         if path.suffix.lower() == ".zip":
-            return read_scene_zip(content_of(path, MAX_ARCHIVE_BYTES), T_palm_tool)
-        text = _text(content_of(path, MAX_BYTES), path.name)
+            return read_scene_zip(bytes_of(path, MAX_ARCHIVE_BYTES), T_palm_tool)
+        text = _text(bytes_of(path, MAX_BYTES), path.name)
         if not is_script(text):
             return _stored(parsed(text), opened, T_palm_tool)
         scene = parse(attached(text, files_in(folder))).scene

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from katana450.arm.control.arm import ArmModel
-from katana450.atomic import write_files, writer_of
+from katana450.atomic import bytes_of, write_files, writer_of
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions import programs
 from katana450.extensions.programs.language.attached_files import attached
@@ -113,10 +113,7 @@ def file_name(name: str) -> str:
 def _text_of(path: Path) -> str:
     """Return the text of a script file. Raises InputError if it cannot be read."""
     try:
-        with path.open("rb") as file:
-            return file.read(MAX_BYTES + 1).decode("utf-8")
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+        return bytes_of(path, MAX_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8 text: {error.reason}.") from error
 

@@ -26,8 +26,8 @@ import numpy as np
 
 from katana450.arm.control.objects.environment import Environment
 from katana450.arm.robot.robot import Robot
+from katana450.atomic import bytes_of
 from katana450.cli.version import version
-from katana450.errors import InputError
 from katana450.portable_rounding import ROUNDS_PORTABLY
 from katana450.settings import Settings
 
@@ -203,10 +203,7 @@ def header_of(
         tool: the link to which targets refer; None for that of the file.
         environment: gives the poses of objects in the hand.
     """
-    try:
-        described = urdf.read_bytes()
-    except OSError as error:
-        raise InputError(f"{urdf} cannot be read: {error.strerror or error}.") from error
+    described = bytes_of(urdf)
     used = RecordedSettings(tuple(settings.ready), settings.bare, settings.rate, tool)
     metadata = {
         "format": FORMAT,

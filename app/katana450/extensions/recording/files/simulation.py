@@ -21,6 +21,7 @@ import numpy as np
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.assembly.robot_session import DescribedRobot, find_robot
+from katana450.atomic import bytes_of
 from katana450.errors import InputError
 from katana450.extensions.recording.codec import Codec, SharedText
 from katana450.extensions.recording.files.header import PORTABLE, ROUNDING
@@ -204,11 +205,7 @@ def session_for(file: RecordingFile, urdf: Path | None = None) -> DescribedRobot
     """
     recorded = file.metadata.get("urdf_sha256")
     path = URDF_PATH if urdf is None else urdf
-    try:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
-    if digest != recorded:
+    if hashlib.sha256(bytes_of(path)).hexdigest() != recorded:
         raise InputError(
             f"{file.path} is a recording of {file.metadata.get('urdf', 'another robot')!r}, not of "
             f"{path}. Name the same URDF, with its meshes beside it, by --urdf."
