@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
 
 from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.environment import obstacle_of
+from katana450.arm.control.session.plans import plan_along
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.scene_objects import SceneObject, Shape
-from katana450.arm.control.state.state import Reason, State
+from katana450.arm.control.session.slow_zones import SLOW_SPEED
+from katana450.arm.control.state.scene_objects import SceneObject, Shape, Zone
+from katana450.arm.control.state.state import Reason, State, Status
 from katana450.errors import InputError
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry import se3
-from tests.ticks import TICK, settled, until_rest
+from katana450.maths.planning.joint_path import JointPath
+from tests.ticks import TICK, settled, states, until_rest
 
 LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
 """[rad] A posture from which axis 1 turns the hand towards x = 0.4 m, y = 0."""
@@ -24,7 +29,7 @@ ZONE = SceneObject(
     Shape.BOX,
     (0.2, 0.1, 0.5),
     se3.from_rotation_translation(np.eye(3), (0.4, -0.1, 0.02)),
-    zone=True,
+    zone=Zone.KEEP_OUT,
 )
 
 
@@ -72,11 +77,71 @@ def test_objects_fall_through_a_zone(session: Session) -> None:
                {"shape": Shape.VESSEL, "size": (0.05, 0.1)}]
 )  # fmt: skip
 def test_a_zone_is_nothing_else(change: dict[str, object]) -> None:
-    with pytest.raises(InputError, match="'door' is a keep-out zone"):
+    with pytest.raises(InputError, match="'door' is a zone"):
         replace(ZONE, **change)  # type: ignore[arg-type]
 
 
 def test_the_water_s_vessels_cannot_be_zones(session: Session) -> None:
     for name in ("cup", "basin"):
-        with pytest.raises(InputError, match=f"The {name} cannot be a keep-out zone"):
+        with pytest.raises(InputError, match=f"The {name} cannot be a zone"):
             session.check(cmd.PlaceObject(replace(ZONE, name=name)))
+
+
+SLOW = replace(ZONE, name="people", zone=Zone.SLOW)
+
+
+def speed_of(session: Session, state: State) -> float:
+    """Return the speed of the tool point [m/s]."""
+    arm = session.require_arm()
+    return arm.kinematics_to(state.tool).tool_speed(state.setpoint, state.motion.qd)
+
+
+def is_inside(session: Session, state: State) -> bool:
+    """Return whether a part of the arm overlaps the zone."""
+    world = session.world
+    assert world is not None
+    placed = world.with_obstacles([obstacle_of(SLOW)]).at(state.x_setpoint)
+    contacts = [placed.contact(pair) for pair in placed.nearer_than(0.0)[0].tolist()]
+    return any("people" in contact.parts and contact.distance < 0.0 for contact in contacts)
+
+
+def passage(session: Session, command: cmd.Command) -> None:
+    """Let the arm move through the zone and out of it; check its speed and its findings."""
+    state = begun(session, SLOW)
+    ticks = until_rest(session, state, cmd.Speed(1.0), command)
+    inside = [passed for passed in ticks if is_inside(session, passed)]
+    assert len(inside) > 20
+    assert max(speed_of(session, passed) for passed in inside) <= SLOW_SPEED + 1e-9
+    for passed in inside:
+        (finding,) = passed.findings
+        assert finding.reason is Reason.SLOW_ZONE
+        assert (finding.parts or ())[1] == "people"
+        assert passed.status is Status.OK
+    assert max(speed_of(session, passed) for passed in ticks) > 1.2 * SLOW_SPEED
+    assert ticks[-1].findings == ()
+    assert ticks[-1].speed == 1.0
+
+
+@pytest.mark.parametrize(
+    "command", [cmd.Joint(1, -1.2), cmd.Joints(LOW - (1.4, 0.0, 0.0, 0.0, 0.0))]
+)
+def test_the_tool_is_slow_in_a_zone(session: Session, command: cmd.Command) -> None:
+    passage(session, command)
+
+
+def test_a_plan_is_slow_in_a_zone(session: Session) -> None:
+    arm = session.require_arm()
+    state = begun(session)
+    path = JointPath(arm.chain, np.array((LOW, LOW - (1.4, 0.0, 0.0, 0.0, 0.0))))
+    passage(session, cmd.Follow(plan_along(arm, session.world_at(state), state, [path])))
+
+
+def test_a_jog_is_slow_in_a_zone(session: Session) -> None:
+    state = begun(session, SLOW)
+    jog = cmd.Jog(np.array((0.0, -0.4, 0.0, 0.0, 0.0)))
+    passed = list(islice(states(session, state, jog, every=True), 220))
+    inside = [state for state in passed if is_inside(session, state)]
+    assert len(inside) > 20
+    assert max(speed_of(session, state) for state in inside) <= SLOW_SPEED + 1e-9
+    for state in inside:
+        assert Reason.SLOW_ZONE in [finding.reason for finding in state.findings]

@@ -95,7 +95,9 @@ def advance(
         return Advance(x)
     minimum = world.kept(MIN_CLEARANCE) if keep is None else keep
     start = world.at(x)
-    travel = world.travel(start, x, towards) if curve is None else _travel(world, start, x, change)
+    travel = (
+        world.travel(start, x, towards) if curve is None else path_lengths(world, start, x, change)
+    )
     part = min(dt / MIN_STOP_TIME, 1.0)
     # Pairs so far apart that the whole path does not matter need no closer check.
     free = minimum + travel / part
@@ -160,7 +162,7 @@ def is_surely_clear(world: CollisionWorld, x: FloatArray, reach: FloatArray) -> 
     return all(placed.distance(pair) >= needed[pair] for pair in pairs.tolist())
 
 
-def _travel(
+def path_lengths(
     world: CollisionWorld, placed: PlacedWorld, x: FloatArray, change: FloatArray
 ) -> FloatArray:
     """Return `CollisionWorld.travel` for a ``change`` (k,) of any size, which may be infinite."""
@@ -322,7 +324,7 @@ class _BentPath:
         (x, first), (end, last) = self._at(low), self._at(high)
         bend = self._curve.bend(low, high)
         change = np.abs(end - x) + 0.5 * bend
-        travel = _travel(self._world, first, x, change)
+        travel = path_lengths(self._world, first, x, change)
         # On the way a radius r_i grows by ``travel`` at most, and the bend is twice the change.
         pull = 4.0 * self._world.linkage.turned(change) * travel
         pull += self._world.travel(first, x, x + bend)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from katana450.arm.control.objects.gripper_model import GripperModel
-from katana450.arm.control.state.scene_objects import Attachment, SceneObject
+from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Zone
 from katana450.caching import cached_property
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
@@ -49,6 +49,12 @@ class Hand:
         return tuple(side for side in (*self.sides, self.fixed_jaw) if side)
 
 
+def obstacle_of(scene_object: SceneObject) -> Part:
+    """Return an object that the hand does not carry as a fixed part of the collision world."""
+    T = scene_object.T_collision_shape
+    return obstacle(scene_object.name, T, scene_object.collision_shape)
+
+
 class Environment:
     """Collision world of the arm with any objects, and the poses of these objects."""
 
@@ -83,11 +89,9 @@ class Environment:
         if self._world is None:
             return None
         standing = [
-            obstacle(
-                scene_object.name, scene_object.T_collision_shape, scene_object.collision_shape
-            )
+            obstacle_of(scene_object)
             for scene_object in objects
-            if not scene_object.carried
+            if not (scene_object.carried or scene_object.zone is Zone.SLOW)
         ]
         world = self._world.with_obstacles(standing) if standing else self._world
         for scene_object in objects:

@@ -235,7 +235,7 @@ class LooseObjects:
 
     def _simulation(self, state: State, loose: Sequence[SceneObject]) -> BodySimulation:
         """Return the simulation of ``loose`` objects among everything else in ``state``."""
-        others = [item for item in state.objects if not (can_move(item) or item.zone)]
+        others = [item for item in state.objects if not (can_move(item) or item.is_zone)]
         masses = [self.mass(scene_object, state) for scene_object in loose]
         key = (
             *((item.name, item.shape, item.extent, item.solid) for item in loose),

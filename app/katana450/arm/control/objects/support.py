@@ -107,7 +107,7 @@ def _lowest(scene_object: SceneObject) -> float:
 
 def is_over(scene_object: SceneObject, other: SceneObject) -> bool:
     """Return whether the middle of ``scene_object`` is over the level top of ``other``."""
-    if other.name == scene_object.name or other.carried or other.zone:
+    if other.name == scene_object.name or other.carried or other.is_zone:
         return False
     if other.shape is Shape.SPHERE:
         return False

@@ -147,7 +147,7 @@ def _check_water(pouring: Pouring | None, volume: float) -> None:
 def _check_object(environment: Environment, scene_object: SceneObject) -> None:
     if scene_object.fixed and environment.hand is None:
         raise InputError(NO_HAND)
-    if scene_object.zone and scene_object.name in (CUP, BASIN):
-        raise InputError(f"The {scene_object.name} cannot be a keep-out zone.")
+    if scene_object.is_zone and scene_object.name in (CUP, BASIN):
+        raise InputError(f"The {scene_object.name} cannot be a zone.")
     if scene_object.name == BASIN and is_vessel(scene_object):
         raise InputError("The basin has a form of its own: give the vessel another name.")

@@ -6,6 +6,7 @@ the arm comes to rest before an obstacle, with the same brake that a stop uses.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -188,6 +189,14 @@ class MotionStepper:
             {} if self._arm is None else self._arm.kinematics.branch_limits(robot.limits)
         )
         self._elbow = {branch: Limiter(limits) for branch, limits in branch_limits.items()}
+
+    def slowed(self, tool_speed: float) -> MotionStepper:
+        """Return this stepper with a tool point that is at most as fast as ``tool_speed`` [m/s]."""
+        if tool_speed >= self._maximum:
+            return self
+        stepper = copy.copy(self)
+        stepper._maximum, stepper._tool_speed = tool_speed, PLANNED_SPEED_FRACTION * tool_speed
+        return stepper
 
     def step(self, state: State, dt: float) -> State:
         """Return ``state`` with its setpoints advanced by ``dt`` [s]."""

@@ -35,6 +35,7 @@ from katana450.arm.control.session.goals import (
 )
 from katana450.arm.control.session.motion_stepper import MotionStepper, Travel, no_travel
 from katana450.arm.control.session.outcome import outcome, take_all
+from katana450.arm.control.session.slow_zones import SLOW_SPEED, SlowZones, with_slow_zone
 from katana450.arm.control.session.stopping import stopped_again, with_presses
 from katana450.arm.control.session.supervision import (
     held_where_measured,
@@ -121,6 +122,7 @@ class Session:
             None if water_environment is None else Pouring(water_environment, self.environment)
         )
         self._loose_objects = LooseObjects(self.environment, water_environment)
+        self._slow_zones = SlowZones(self.environment)
         self._robot = robot
         self._limits = robot.limits
         self._objects = objects
@@ -204,7 +206,7 @@ class Session:
             state = end_stream(state, self._stepper(state).stopping_point(state)[0], self._limits)
         dt = min(t - state.t, MAX_STEP_TIME)
         start = state.setpoint
-        state = self._stepper(state).step(replace(state, t=max(t, state.t)), dt)
+        state = self._moved(replace(state, t=max(t, state.t)), dt)
         if state.mode is IDLE and state.motion.at_rest and state.goal is not state.setpoint:
             # A brake can end one rounding beside its predicted end.
             state = replace(state, goal=state.setpoint)
@@ -218,6 +220,15 @@ class Session:
             return state
         rest = self._stepper(state).stopping_point(state)[0]
         return tool_targets.jogged(self.require_arm(), state, state.intent, start, rest)
+
+    def _moved(self, state: State, dt: float) -> State:
+        """Return ``state`` after the motion of the arm in ``dt`` [s]."""
+        stepper, speed = self._stepper(state), state.speed
+        zone = self._slow_zones.finding(state, stepper)
+        if zone is not None:
+            stepper = stepper.slowed(SLOW_SPEED)
+            state = replace(state, speed=min(speed, SLOW_SPEED / self._tool_speed))
+        return with_slow_zone(replace(stepper.step(state, dt), speed=speed), zone)
 
     @staticmethod
     def observe(state: State, q: FloatArray, gripper: float) -> State:

@@ -176,7 +176,14 @@ def contact_at(world: CollisionWorld | None, q: FloatArray, gripper: float) -> C
     return nearest if nearest is not None and nearest.distance < MIN_CLEARANCE else None
 
 
-KEPT_REASONS = (Reason.PAUSED, Reason.CONTACT, Reason.WAITING, *CAUSES, *GRIPPER_REASONS)
+KEPT_REASONS = (
+    Reason.PAUSED,
+    Reason.CONTACT,
+    Reason.WAITING,
+    Reason.SLOW_ZONE,
+    *CAUSES,
+    *GRIPPER_REASONS,
+)
 """The reasons that a jog keeps; it computes all others again."""
 
 

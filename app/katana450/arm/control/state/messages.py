@@ -146,6 +146,12 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
         f"{part((f.parts or ('the object',))[0])} slipped out of the fingers under a load of "
         f"{short(f.amount)} N: open the gripper, then grip it with more force"
     ),
+    Reason.SLOW_ZONE: lambda f: (
+        "{} is in or near the zone {}: the tool moves with at most ".format(
+            *map(part, f.parts or ("a part", "of reduced speed"))
+        )
+        + f"{short(1e3 * f.amount)} mm/s"
+    ),
     Reason.NOT_AT_START: lambda f: (
         f"the plan begins at another posture: {axis(f.axis)} is "
         f"{short(math.degrees(f.amount))}° off, or the arm still moves; go to its start first"
@@ -223,6 +229,7 @@ ABOUT_NOW = (
     Reason.CONTACT,
     Reason.LOPSIDED,
     Reason.SLIPPED,
+    Reason.SLOW_ZONE,
     Reason.INTERNAL,
 )
 """Reasons whose numbers are present ones. Those of all others belong to the goal."""

@@ -75,6 +75,17 @@ class Attachment(Enum):
     """The object is put down upright on the table below, and stays there."""
 
 
+class Zone(Enum):
+    """Rule for the arm in the space of an object that is no body: all else passes through it."""
+
+    NONE = "none"
+    """The object is a body."""
+    KEEP_OUT = "keep_out"
+    """The arm and what it carries keep clear of it."""
+    SLOW = "slow"
+    """The tool moves slowly while a part of the arm is in it."""
+
+
 @dataclass(frozen=True, eq=False)
 class SceneObject:
     """An object that stands on z = 0 of its own frame.
@@ -89,8 +100,7 @@ class SceneObject:
         scale: factor on ``size``.
         appearance: how it is drawn.
         fixed: whether it is fixed to the hand.
-        zone: whether it is a keep-out zone: the arm and what it carries keep clear of it, and all
-            else passes through it.
+        zone: its rule for the arm, if it is no body.
     """
 
     name: str
@@ -103,7 +113,7 @@ class SceneObject:
     scale: float = 1.0
     appearance: ObjectAppearance = PLAIN
     fixed: bool = False
-    zone: bool = False
+    zone: Zone = Zone.NONE
 
     def __post_init__(self) -> None:
         if not (self.name.isprintable() and 0 < len(self.name) <= MAX_NAME_LENGTH):
@@ -140,14 +150,19 @@ class SceneObject:
         object.__setattr__(self, "size", tuple(size.tolist()))
         if self.fixed and self.held:
             raise InputError(f"{self.name!r} must be either fixed to the hand or held by it.")
-        if self.zone and (self.carried or self.can_be_held or self.shape is Shape.VESSEL):
+        if self.is_zone and (self.carried or self.can_be_held or self.shape is Shape.VESSEL):
             raise InputError(
-                f"{self.name!r} is a keep-out zone, so the hand cannot hold it and it is no vessel."
+                f"{self.name!r} is a zone, so the hand cannot hold it and it is no vessel."
             )
         T = frozen(se3.validated(self.T, f"The pose of {self.name!r}"))
         if np.abs(T[:3, 3]).max() > MAX_COORDINATE:
             raise InputError(f"{self.name!r} would be more than {MAX_COORDINATE:g} m away.")
         object.__setattr__(self, "T", T)
+
+    @property
+    def is_zone(self) -> bool:
+        """True if the object is no body."""
+        return self.zone is not Zone.NONE
 
     @property
     def carried(self) -> bool:

@@ -75,6 +75,7 @@ class Reason(Enum):
     LOPSIDED = "one finger only"
     SLIDING = "sliding"
     SLIPPED = "slipped"
+    SLOW_ZONE = "zone of reduced speed"
     INTERNAL = "internal error"
     RESTARTED = "restarted"
     WAITING = "waiting"
@@ -120,7 +121,7 @@ class Finding:
             stop, the travel of the tool, or else of any link, until rest [m]; for a plan, the
             distance of the arm from its start [rad]; for silence and lateness, the time [s]; for a
             tracking error and a measured stop, the angle of a joint [rad]; for an object that
-            slides or has slipped, its load [N].
+            slides or has slipped, its load [N]; for a zone, the maximum speed of the tool [m/s].
         axis: the axis that the finding concerns, counted from 0; None if it concerns no axis.
         parts: the two links or objects that the finding concerns; None if it concerns none.
         time: for a stop, the time until rest [s].
@@ -294,7 +295,8 @@ class State:
             return Status.BLOCKED
         if any(finding.reason is Reason.ACROSS_GAP for finding in self.findings):
             return Status.GAP
-        return Status.LIMITED if self.findings else Status.OK
+        limited = any(finding.reason is not Reason.SLOW_ZONE for finding in self.findings)
+        return Status.LIMITED if limited else Status.OK
 
     @property
     def waits(self) -> bool:
