@@ -14,7 +14,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.scene_objects import SceneObject, Shape, Zone
 from katana450.arm.control.state.solid import ObjectAppearance, Solid
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.errors import InputError
@@ -77,17 +77,18 @@ def objects(draw: st.DrawFn, name: str) -> SceneObject:
     colour = draw(st.none() | st.tuples(*(st.integers(0, 255),) * 3))
     look = ObjectAppearance(colour, draw(st.floats(0.05, 1.0)), draw(st.booleans()))
     size = draw(st.lists(st.floats(0.01, 1.0), min_size=form.numbers, max_size=form.numbers))
-    zone = form is not Shape.VESSEL and draw(st.booleans())
+    zone = Zone.NONE if form is Shape.VESSEL else draw(st.sampled_from(Zone))
+    is_zone = zone is not Zone.NONE
     return SceneObject(
         name,
         form,
         tuple(size),
         draw(poses()),
-        not zone and draw(st.booleans()),
+        not is_zone and draw(st.booleans()),
         solid=SOLID if form is Shape.MESH else None,
         scale=draw(st.sampled_from((1.0, 0.5)) | st.floats(0.2, 1.9)),
         appearance=look,
-        fixed=not zone and draw(st.booleans()),
+        fixed=not is_zone and draw(st.booleans()),
         zone=zone,
     )
 

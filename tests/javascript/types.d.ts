@@ -108,7 +108,7 @@ declare namespace Api {
   interface PersonConnection { name: string; address: string; since: string; }
   interface Place { do: "place"; id?: number | string | null; revocations?: number | null; made?: number | null;
     name: string; T?: number[][] | null; near?: [number, number] | null; frame?: Frame; shape?: Shape | null;
-    size?: number[] | null; mesh?: string | null; can_be_held?: boolean | null; zone?: boolean | null;
+    size?: number[] | null; mesh?: string | null; can_be_held?: boolean | null; zone?: Zone | null;
     scale?: number | null; colour?: string | null; opacity?: number | null; hidden?: boolean | null; }
   interface Pose { do: "pose"; T: number[][]; frame?: Frame; id?: number | string | null; revocations?: number | null;
     made?: number | null; wait?: number | null; }
@@ -138,7 +138,7 @@ declare namespace Api {
   interface Scene { is: "scene"; id?: number | string | null; key: string; objects: string[]; text: string; }
   interface SceneObject { name: string; shape: string; size: number[]; T: number[][]; can_be_held: boolean;
     held: boolean; mesh: string | null; scale: number; colour: string | null; opacity: number; hidden: boolean;
-    fixed: boolean; zone: boolean; }
+    fixed: boolean; zone: string; }
   interface Servo { do: "servo"; q: number[]; qd?: number[] | null; gripper?: number | null;
     id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface Set { do: "set"; id?: number | string | null; revocations?: number | null; made?: number | null;
@@ -182,4 +182,5 @@ declare namespace Api {
     heartbeat: number; api?: number; stop_port?: number | null; }
   interface Withdraw { do: "withdraw"; id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface World { is: "world"; id?: number | string | null; nodes: Node[]; }
+  type Zone = "keep_out" | "none" | "slow";
 }

@@ -98,7 +98,7 @@ def test_present_scene_is_accepted(stage: Stage, scene: ScriptScene, beginning: 
         ("[30, 30, 250]", "[30, 31, 250]", "post has another shape or size"),
         (", 250]", ", 250], scale: 0.5", "post has the scale 0.5, not 1"),
         (", 0, 20]", ", 0, 20], can_be_held: true", "post can be held"),
-        (", 0, 20]", ", 0, 20], zone: true", "post is a keep-out zone"),
+        (", 0, 20]", ", 0, 20], zone: slow", "post has the zone slow, not none"),
         ("- {name: post", "- {name: pole", "there is no post"),
         ("objects:", f"objects:\n- {{name: ball, shape: sphere, size: [20], {AT}}}",
          "there is also ball"),

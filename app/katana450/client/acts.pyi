@@ -7,7 +7,7 @@ import numpy.typing as npt
 from katana450.arm.control.commands.act import Request
 from katana450.arm.control.commands.tool_commands import Frame
 from katana450.arm.control.state.arm_report import ArmAct
-from katana450.arm.control.state.scene_objects import Attachment, Shape
+from katana450.arm.control.state.scene_objects import Attachment, Shape, Zone
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.requests import FieldName, FieldSetting
@@ -318,7 +318,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
         size: list[float] | None = ...,
         mesh: str | None = ...,
         can_be_held: bool | None = ...,
-        zone: bool | None = ...,
+        zone: Zone | None = ...,
         scale: float | None = ...,
         colour: str | None = ...,
         opacity: float | None = ...,
@@ -341,8 +341,8 @@ class Acts(Generic[AtRest, Answered, Sent]):
                 (radius). The size of a mesh is that of its file.
             mesh: Key of the mesh, from the answer to its upload.
             can_be_held: Whether the fingers may touch the object; they hold it between both sides.
-            zone: Whether it is a keep-out zone: the arm and what it carries keep clear of it, and
-                objects pass through it.
+            zone: Rule for the arm in a space that all else passes through: the arm and what it carries
+                keep out, or its tool moves at most at 250 mm/s. "none" for a body.
             scale: Factor on the size.
             colour: Colour such as "#94a3b8", or "own" for the colour of the file.
             opacity: Opacity, 1 for an opaque object.

@@ -84,7 +84,7 @@ class RenderStage:
         x = state.x
         items = [Item(TABLE, shape, np.eye(4)) for shape in self._table]
         for scene_object in state.objects:
-            if scene_object.appearance.hidden or scene_object.zone:
+            if scene_object.appearance.hidden or scene_object.is_zone:
                 continue
             T = self._session.environment.pose(scene_object, x)
             shapes = self._shapes(scene_object)

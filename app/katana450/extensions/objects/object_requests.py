@@ -15,6 +15,7 @@ from katana450.arm.control.state.scene_objects import (
     Attachment,
     SceneObject,
     Shape,
+    Zone,
     named,
 )
 from katana450.arm.control.state.solid import PLAIN, ObjectAppearance
@@ -116,7 +117,9 @@ class ObjectRequests(RequestHandler):
         can_be_held = known is not None and known.can_be_held
         if request.can_be_held is not None:
             can_be_held = request.can_be_held
-        zone = known is not None and known.zone if request.zone is None else request.zone
+        zone = Zone.NONE if known is None else known.zone
+        if request.zone is not None:
+            zone = request.zone
         return SceneObject(
             request.name,
             shape,

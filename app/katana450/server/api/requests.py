@@ -24,6 +24,7 @@ from katana450.arm.control.commands.tool_commands import *
 from katana450.arm.control.commands.tool_commands import Frame
 from katana450.arm.control.state.scene_objects import Attachment as Attachment
 from katana450.arm.control.state.scene_objects import Shape as Shape
+from katana450.arm.control.state.scene_objects import Zone as Zone
 from katana450.errors import InputError
 from katana450.server.api.fields import *
 from katana450.server.api.fields import (
@@ -189,8 +190,8 @@ class Place(Request, frozen=True, kw_only=True, eq=False):
             (radius). The size of a mesh is that of its file.
         mesh: Key of the mesh, from the answer to its upload.
         can_be_held: Whether the fingers may touch the object; they hold it between both sides.
-        zone: Whether it is a keep-out zone: the arm and what it carries keep clear of it, and
-            objects pass through it.
+        zone: Rule for the arm in a space that all else passes through: the arm and what it carries
+            keep out, or its tool moves at most at 250 mm/s. "none" for a body.
         scale: Factor on the size.
         colour: Colour such as "#94a3b8", or "own" for the colour of the file.
         opacity: Opacity, 1 for an opaque object.
@@ -207,7 +208,7 @@ class Place(Request, frozen=True, kw_only=True, eq=False):
     size: Annotated[list[float], Meta(min_length=1, max_length=3)] | None = None
     mesh: Key | None = None
     can_be_held: bool | None = None
-    zone: bool | None = None
+    zone: Zone | None = None
     scale: Annotated[float, Meta(ge=1e-3, le=1e3)] | None = None
     colour: Annotated[str, Meta(pattern="^(own|#[0-9a-f]{6})$")] | None = None
     opacity: Annotated[float, Meta(ge=0.05, le=1.0)] | None = None

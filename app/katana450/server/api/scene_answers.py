@@ -44,7 +44,7 @@ class SceneObject(msgspec.Struct, frozen=True, kw_only=True):
     opacity: float = 1.0
     hidden: bool = False
     fixed: bool = False
-    zone: bool = False
+    zone: str = "none"
 
 
 class Objects(Answer, frozen=True, kw_only=True):

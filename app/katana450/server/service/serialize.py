@@ -47,6 +47,7 @@ UNITS = {
     control.Reason.SLIDING: "N",
     control.Reason.SLIPPED: "N",
     control.Reason.NOT_AT_START: "rad",
+    control.Reason.SLOW_ZONE: "m/s",
 }
 """Units of the amounts; the other reasons have no amount."""
 
@@ -307,7 +308,7 @@ def objects(arm: ArmHandle) -> answers.Objects:
                 opacity=scene_object.appearance.opacity,
                 hidden=scene_object.appearance.hidden,
                 fixed=scene_object.fixed,
-                zone=scene_object.zone,
+                zone=scene_object.zone.value,
             )
             for scene_object in now.objects
         ]

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control.objects.environment import Environment
-from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.scene_objects import SceneObject, Shape, Zone
 from katana450.arm.control.state.solid import Colour, Solid
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.creases import Drawn, drawn, glb
@@ -25,8 +25,8 @@ from katana450.server.viser_bridge.posing import place, turn
 COLOUR = (148, 163, 184)
 """Colour of an object without a colour of its own."""
 
-ZONE_COLOUR, ZONE_OPACITY = (245, 158, 11), 0.25
-"""Colour and maximum opacity of a keep-out zone without a colour of its own."""
+ZONE_COLOURS, ZONE_OPACITY = {Zone.KEEP_OUT: (239, 130, 20), Zone.SLOW: (250, 204, 21)}, 0.25
+"""Colours of zones without a colour of their own, and their maximum opacity."""
 
 COAT_SCALE = 1.005
 """Scale of a contact coat relative to its object, so that the two do not flicker."""
@@ -183,8 +183,8 @@ class ObjectShape:
             color=_colour(scene_object),
             opacity=_opacity(scene_object),
             side="double" if scene_object.shape is Shape.MESH else "front",
-            cast_shadow=not scene_object.zone,
-            receive_shadow=not scene_object.zone,
+            cast_shadow=not scene_object.is_zone,
+            receive_shadow=not scene_object.is_zone,
             scale=self._scale(scene_object),
         )
 
@@ -267,12 +267,12 @@ def _of(mesh: Any) -> Drawn:
 
 
 def _colour(scene_object: SceneObject) -> Colour:
-    return scene_object.appearance.colour or (ZONE_COLOUR if scene_object.zone else COLOUR)
+    return scene_object.appearance.colour or ZONE_COLOURS.get(scene_object.zone, COLOUR)
 
 
 def _opacity(scene_object: SceneObject) -> float | None:
     opacity = scene_object.appearance.opacity
-    if scene_object.zone:
+    if scene_object.is_zone:
         return min(opacity, ZONE_OPACITY)
     return None if opacity == 1.0 else opacity
 

@@ -114,10 +114,11 @@ def _object_entry(
     for name, true in (
         ("hidden", scene_object.appearance.hidden),
         ("can_be_held", scene_object.can_be_held),
-        ("zone", scene_object.zone),
     ):
         if true:
             entry[name] = True
+    if scene_object.is_zone:
+        entry["zone"] = scene_object.zone.value
     if scene_object.fixed:
         entry["attach"] = "hand"
     return entry

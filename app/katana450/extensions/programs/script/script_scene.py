@@ -19,6 +19,7 @@ from katana450.arm.control.state.scene_objects import (
     MIN_SCALE,
     SceneObject,
     Shape,
+    Zone,
 )
 from katana450.arm.control.state.solid import MIN_OPACITY, Colour, ObjectAppearance, Solid
 from katana450.arm.control.state.state import State
@@ -169,7 +170,9 @@ class SceneEntry(Declared):
     ] = None
     opacity: Annotated[float, number(MIN_OPACITY, 1.0, about="1 is opaque")] = 1.0
     hidden: Annotated[bool, FLAG.about("Whether it is not drawn")] = False
-    zone: Annotated[bool, FLAG.about("Whether it is a keep-out zone for the arm")] = False
+    zone_name: Annotated[
+        str, choice(*(zone.value for zone in Zone)).about("Rule for the arm in it").named("zone")
+    ] = Zone.NONE.value
     attach: Annotated[str, choice("hand", "world").about("hand: it moves with the hand")] = "world"
 
     @classmethod
@@ -274,7 +277,7 @@ class SceneDraft(Declared):
                         scale=entry.scale,
                         appearance=entry.appearance,
                         fixed=entry.fixed,
-                        zone=entry.zone,
+                        zone=Zone(entry.zone_name),
                     )
                 )
             except InputError as error:
@@ -440,8 +443,8 @@ def _object_difference(
         return f"{entry.name} is {'' if present.carried else 'not '}in the hand"
     if entry.can_be_held is not present.can_be_held:
         return f"{entry.name} can{'' if present.can_be_held else 'not'} be held"
-    if entry.zone is not present.zone:
-        return f"{entry.name} is {'' if present.zone else 'not '}a keep-out zone"
+    if entry.zone_name != present.zone.value:
+        return f"{entry.name} has the zone {present.zone.value}, not {entry.zone_name}"
     T = entry.T if T_palm_tool is None or not entry.fixed else T_palm_tool @ entry.T
     if float(np.linalg.norm(T[:3, 3] - present.T[:3, 3])) > SAME_PLACE:
         return f"{entry.name} is at {_point(present.T)}, not at {_point(T)}"
