@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from katana450.extensions.programs.building.actions import FollowPlan, Task
-from katana450.extensions.programs.run.measured_run import path_of, place_of, run_errors
+from katana450.extensions.programs.run.measured_run import path_fraction, path_of, run_errors
 from katana450.extensions.programs.run.simulation import Simulation
 from katana450.extensions.programs.script.measures import motion_measures, water_measures
 from katana450.extensions.programs.script.script import Script
@@ -88,7 +88,7 @@ def executed_tasks(run: Simulation) -> tuple[Task, ...]:
     return tuple(task for number, task in enumerate(run.program.tasks) if number in executed)
 
 
-def alongs(run: Simulation) -> tuple[PathTrace, ...]:
+def traced_paths(run: Simulation) -> tuple[PathTrace, ...]:
     """Return the paths of the tool in a run, each repeated path once."""
     traces: dict[int, PathTrace] = {}
     for task in executed_tasks(run):
@@ -97,13 +97,13 @@ def alongs(run: Simulation) -> tuple[PathTrace, ...]:
         for segment in task.action.plan.segments:
             path = segment.path
             if isinstance(path, CurvePath) and id(path) not in traces:
-                traces[id(path)] = _along(task.name, path)
+                traces[id(path)] = _traced(task.name, path)
     return tuple(traces.values())
 
 
 def measurements(run: Simulation) -> dict[str, float | None]:
     """Return each of MEASURES by its name; None if it does not apply."""
-    paths, limits = alongs(run), run.arm.limits
+    paths, limits = traced_paths(run), run.arm.limits
     errors = np.concatenate([path.error for path in paths]) if paths else np.empty(0)
     turned = np.concatenate([path.turned for path in paths]) if paths else np.empty(0)
     tools = [state.tool for state in run.states]
@@ -142,7 +142,7 @@ def errors_between_ticks(run: Simulation) -> FloatArray:
     """
     errors: list[float] = []
     for before, after in pairwise(run.states):
-        path, sigma, next_sigma = path_of(before), place_of(before), place_of(after)
+        path, sigma, next_sigma = path_of(before), path_fraction(before), path_fraction(after)
         if path is None or path is not path_of(after) or sigma == next_sigma:
             continue
         q = 0.5 * (before.setpoint + after.setpoint)
@@ -159,7 +159,7 @@ def bounds(script: Script, values: dict[str, float | None]) -> tuple[Bound, ...]
     )
 
 
-def _along(name: str, path: CurvePath) -> PathTrace:
+def _traced(name: str, path: CurvePath) -> PathTrace:
     sigma = np.linspace(0.0, 1.0, PATH_SAMPLES + 1)
     q = joint_derivatives(path, sigma)[0]
     traced = np.array([_point(path, posture) for posture in q])

@@ -24,11 +24,11 @@ from katana450.extensions.media.figures import measured_figure
 from katana450.extensions.media.measures import (
     Bound,
     PourRecord,
-    alongs,
     bounds,
     measurements,
+    traced_paths,
 )
-from katana450.extensions.programs.run.measured_run import MeasuredRun, place_of
+from katana450.extensions.programs.run.measured_run import MeasuredRun, path_fraction
 from katana450.extensions.programs.run.simulation import Simulation
 from katana450.extensions.programs.script.measures import MEASURES, title_of, unit_of
 from katana450.extensions.programs.script.script import Script
@@ -161,7 +161,7 @@ class Report:
             ),
             "tool": [state.tool for state in run.states],
             **self._of_tool(run.q, ""),
-            "path_fraction": [place_of(state) for state in run.states],
+            "path_fraction": [path_fraction(state) for state in run.states],
             **({} if pour is None else pour.columns),
         }
         if run.measured is not None:
@@ -194,7 +194,7 @@ class Report:
             raise InputError(
                 f"{directory} cannot be created: {error.strerror or error}."
             ) from error
-        paths = alongs(self.run)
+        paths = traced_paths(self.run)
         images = dict(pictures)
         if paths:
             images["path.png"] = figures.path_figure(paths)

@@ -206,7 +206,7 @@ def paths_of(states: Sequence[State]) -> list[tuple[CurvePath, list[int]]]:
     return list(numbers.values())
 
 
-def place_of(state: State) -> float:
+def path_fraction(state: State) -> float:
     """Return the place on the path of the plan, from 0 to 1; 0 while the arm follows no plan."""
     following = state.following
     return 0.0 if following is None else following.segment.scaling.pace(following.local).sigma
@@ -215,7 +215,7 @@ def place_of(state: State) -> float:
 def commanded_errors(path: CurvePath, states: Sequence[State]) -> FloatArray:
     """Return the distances (N,) [m] of the setpoints from the points of ``path`` that were due."""
     points = forward_batch(path.chain, np.array([state.setpoint for state in states]))[:, :3, 3]
-    desired = point_derivatives(path, np.array([place_of(state) for state in states]))[0]
+    desired = point_derivatives(path, np.array([path_fraction(state) for state in states]))[0]
     return np.asarray(np.linalg.norm(points - desired, axis=1))
 
 

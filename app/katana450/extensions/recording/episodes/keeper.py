@@ -111,8 +111,8 @@ class EpisodeKeeper:
 
     def _finish(self, interrupted: Sequence[EpisodeMarker]) -> None:
         try:
-            for said in finish_interrupted(self._folder, interrupted):
-                self._note_change(said)
+            for sentence in finish_interrupted(self._folder, interrupted):
+                self._note_change(sentence)
             self._running.hold_needed()
         except Exception:
             # They keep their markers, and new episodes can be recorded.

@@ -63,7 +63,7 @@ def finish_interrupted(folder: EpisodeFolder, markers: Sequence[EpisodeMarker]) 
     Returns a sentence about each. Those that cannot be written now keep their markers, for the
     next attempt.
     """
-    said = []
+    sentences = []
     for marker in markers:
         number = marker.episode.number
         if any(folder.path(number, discarded=discarded).exists() for discarded in (False, True)):
@@ -72,16 +72,16 @@ def finish_interrupted(folder: EpisodeFolder, markers: Sequence[EpisodeMarker]) 
         try:
             cut_out(folder, marker, "unfinished")
         except NothingRecordedError:
-            said.append(f"Episode {number} was interrupted before anything was recorded.")
+            sentences.append(f"Episode {number} was interrupted before anything was recorded.")
         except InputError as error:
-            said.append(f"Episode {number} cannot be saved: {error}")
-            log.error("%s", said[-1])
+            sentences.append(f"Episode {number} cannot be saved: {error}")
+            log.error("%s", sentences[-1])
             continue
         else:
-            said.append(f"Episode {number} was interrupted and is kept as unfinished.")
-        log.warning("%s", said[-1])
+            sentences.append(f"Episode {number} was interrupted and is kept as unfinished.")
+        log.warning("%s", sentences[-1])
         folder.unmark(number)
-    return said
+    return sentences
 
 
 @contextmanager

@@ -167,7 +167,7 @@ class PlaybackRoutes:
             if shown[0] is None:
                 raise InputError("Nothing is recorded yet: the arm has not moved.")
             windows.show(key, shown)
-            moments = [_said(moment) for moment in shown]
+            moments = [_moment_content(moment) for moment in shown]
             return _json({"moments": moments, "moving": windows.moving})
 
         return await self._in_thread(show)
@@ -319,7 +319,7 @@ def _rows(run: AnyRun, place: float, times: list[float]) -> list[StateRow | None
     return run.rows_at([at_place(spans, place + t) for t in times])
 
 
-def _said(moment: RecordedMoment | None) -> dict[str, Any] | None:
+def _moment_content(moment: RecordedMoment | None) -> dict[str, Any] | None:
     """Return what the page and programs read of a moment."""
     if moment is None:
         return None
