@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
 
+from katana450.caching import cached_property
 from katana450.extensions.programs.language.expression import (
     FUNCTIONS,
     UNITS,
@@ -23,8 +23,6 @@ NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 ITEM = re.compile(r"\[(\d+)\]")
 """Pattern of the number of an item of a list, as in ``corner[0]``."""
 
-V = TypeVar("V")
-
 RESERVED = frozenset(
     {*UNITS, *FUNCTIONS, "x", "y", "z", "pi", "open", "closed", "keep", "roomiest"}
 )
@@ -36,13 +34,20 @@ class Scope:
     """The values that names stand for at one place of a script.
 
     Attributes:
-        values: all values by their names, and the parts of mappings by names such as ``box.name``.
-        numbers: those that are numbers, and the numbers in mappings and lists, by names such as
-            ``corner.x`` and ``corner.0``.
+        values: all values by their names, and the parts of mappings and lists by names such as
+            ``box.name`` and ``corner.0``.
     """
 
     values: Mapping[str, YamlValue] = field(default_factory=dict)
-    numbers: Mapping[str, Quantity] = field(default_factory=dict)
+
+    @cached_property
+    def numbers(self) -> Mapping[str, Quantity]:
+        """The values that are numbers."""
+        return {
+            name: Quantity(value.number, value.unit)
+            for name, value in self.values.items()
+            if value.number is not None
+        }
 
     def having(self, name: YamlValue, value: YamlValue) -> Scope:
         """Return the scope with one more value, in which the names so far may be used.
@@ -55,19 +60,16 @@ class Scope:
         if word in RESERVED:
             raise name.wrong(f"{word!r} has a meaning of its own. Choose another name.")
         bound = self.bound(value)
-        values, numbers = _without(self.values, word), _without(self.numbers, word)
-        if bound.number is not None:
-            numbers[word] = Quantity(bound.number, bound.unit)
-        parts: list[tuple[object, YamlValue]] = []
+        values = {
+            name: other
+            for name, other in self.values.items()
+            if name != word and not name.startswith(f"{word}.")
+        }
         if bound.kind == "mapping":
-            parts = [(part.held, inner) for part, inner in bound.fields]
+            values |= {f"{word}.{part.held}": inner for part, inner in bound.fields}
         elif bound.kind == "list":
-            parts = list(enumerate(bound.items))
-        for part, inner in parts:
-            values[f"{word}.{part}"] = inner
-            if inner.number is not None:
-                numbers[f"{word}.{part}"] = Quantity(inner.number, inner.unit)
-        return Scope({**values, word: bound}, numbers)
+            values |= {f"{word}.{number}": inner for number, inner in enumerate(bound.items)}
+        return Scope({**values, word: bound})
 
     def bound(self, value: YamlValue) -> YamlValue:
         """Return ``value`` with names and expressions in it replaced by what they stand for."""
@@ -124,12 +126,3 @@ class ScriptContext:
     scope: Scope = field(default_factory=Scope)
     poses: Mapping[str, StepTarget] = field(default_factory=dict)
     definitions: Mapping[str, Definition] = field(default_factory=dict)
-
-
-def _without(named: Mapping[str, V], word: str) -> dict[str, V]:
-    """Return ``named`` without the value ``word`` and its parts."""
-    return {
-        name: value
-        for name, value in named.items()
-        if name != word and not name.startswith(f"{word}.")
-    }
