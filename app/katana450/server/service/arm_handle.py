@@ -9,7 +9,6 @@ from concurrent.futures import Future
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.environment import Environment
-from katana450.arm.control.objects.pouring import Pouring
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.silence import SilenceProfile
 from katana450.arm.control.session.stopping import clear_refusal
@@ -68,11 +67,6 @@ class ArmHandle:
         return self._state_publisher.snapshot
 
     @property
-    def ready(self) -> FloatArray:
-        """(n,) Posture to which Home moves [rad]."""
-        return self.session.ready
-
-    @property
     def profile(self) -> SilenceProfile:
         """The reaction of the moving arm to silence."""
         return self._front_end.profile
@@ -81,11 +75,6 @@ class ArmHandle:
     def environment(self) -> Environment:
         """The environment, which computes the poses of objects."""
         return self.session.environment
-
-    @property
-    def pouring(self) -> Pouring | None:
-        """The model of the water; None without one."""
-        return self.session.pouring
 
     @property
     def arm(self) -> MountedArm:

@@ -180,7 +180,7 @@ class Dispatcher:
         """Return the answer to a query that depends on the newest snapshot alone."""
         match subject:
             case "arm":
-                return serialize.arm(arm.robot, arm.ready.tolist(), arm.environment.hand)
+                return serialize.arm(arm)
             case "links":
                 return arm.nodes.links(arm.state)
             case "branches":

@@ -143,7 +143,7 @@ def _of_snapshot(arm: ArmHandle, snapshot: Snapshot) -> dict[str, Any]:
         "detour": None if now.detour is None else now.detour.duration / now.speed,
         "speed": now.speed,
         "silence_profile": arm.profile.value,
-        "water": water(arm.pouring, now),
+        "water": water(arm.session.pouring, now),
         "arm": None if now.report is None else measured_arm(now, now.report),
         **(NO_TOOL if mounted is None else _of_tool(mounted, arm.margins, now)),
     }
@@ -230,9 +230,9 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
     )
 
 
-def arm(robot: Robot, ready: list[float], hand: Hand | None) -> answers.Arm:
-    """Return the description of ``robot``. ``ready``: posture to which Home moves."""
-    mounted = robot.arm
+def arm(handle: ArmHandle) -> answers.Arm:
+    """Return the description of the arm of ``handle``."""
+    robot, mounted, hand = handle.robot, handle.robot.arm, handle.environment.hand
     model = robot.joint_group if mounted is None else mounted
     names = robot.joint_group.names if mounted is None else mounted.chain.names
     limits, gripper = model.limits, model.gripper
@@ -244,7 +244,7 @@ def arm(robot: Robot, ready: list[float], hand: Hand | None) -> answers.Arm:
         speed=limits.speed.tolist(),
         acceleration=limits.acceleration.tolist(),
         jerk=limits.jerk.tolist(),
-        ready=ready,
+        ready=handle.session.ready.tolist(),
         tools={} if mounted is None else {name: M.tolist() for name, M in mounted.tools.items()},
         default_tool=None if mounted is None else mounted.default_tool,
         gripper=(gripper.closed, gripper.opened, gripper.speed) if gripper.moves else None,
