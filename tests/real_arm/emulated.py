@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 import socket
+import struct
 import subprocess
 import sys
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+import threading
+import time
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +27,51 @@ from katana450.extensions.real_arm.codec.requests import (
 )
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware
+from katana450.extensions.real_arm.emulator.server import IDLE, EmulatorServer
 from katana450.extensions.real_arm.link import ArmLink, TcpTransport
 
 ROOT = Path(__file__).resolve().parents[2]
 
 TIMEOUT = 20.0
 """[s] for anything that a process does."""
+
+
+class FaultyServer(EmulatorServer):
+    """A server that answers late, and whose connection can be reset."""
+
+    def __init__(self, arm: EmulatedArm, reply_delay: Callable[[], float] = lambda: 0.0) -> None:
+        """Serve ``arm``. ``reply_delay`` returns the time by which the next reply is late [s]."""
+        super().__init__(arm, "127.0.0.1", 0)
+        self._reply_delay = reply_delay
+        self._dropping = threading.Event()
+
+    def drop_client(self) -> None:
+        """Reset the connection to the client, if there is one, within a turn of ``run``."""
+        self._dropping.set()
+
+    def _turn(self) -> None:
+        if self._dropping.is_set():
+            self._dropping.clear()
+            with self.lock:
+                if self._client is not None:
+                    with suppress(OSError):
+                        linger = struct.pack("ii", 1, 0)
+                        self._client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+                self._drop()
+        super()._turn()
+
+    def _send(self, client: socket.socket, reply: bytes) -> bool:
+        """Send ``reply`` after the delay, in which the arm moves."""
+        end = time.monotonic() + self._reply_delay()
+        while (left := end - time.monotonic()) > 0.0 and not self._ending.is_set():
+            # Others may look at the arm meanwhile.
+            self.lock.release()
+            try:
+                time.sleep(min(left, IDLE))
+            finally:
+                self.lock.acquire()
+            self._advance()
+        return super()._send(client, reply)
 
 
 class Bench:

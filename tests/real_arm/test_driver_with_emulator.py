@@ -17,10 +17,10 @@ from katana450.extensions.real_arm.codec.codecs import RequestReceived
 from katana450.extensions.real_arm.driver.katana_driver import MAX_SILENCE, KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware
-from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.link import ArmUrl
 from tests.conftest import LONG
 from tests.real_arm.control_loop import SmallLoop, swing
+from tests.real_arm.emulated import FaultyServer
 from tests.real_arm.paper_arm import ENDS, JOINTS
 
 CUTS = 200 if LONG else 6
@@ -62,10 +62,10 @@ def wire(monkeypatch: pytest.MonkeyPatch) -> Wire:
 
 
 @contextmanager
-def emulated() -> Iterator[tuple[SmallLoop, EmulatorServer]]:
+def emulated() -> Iterator[tuple[SmallLoop, FaultyServer]]:
     """Yield a loop with the driver of an emulated arm."""
     arm = EmulatedArm(calibrated=True)
-    server = EmulatorServer(arm, "127.0.0.1", 0)
+    server = FaultyServer(arm)
     server.start()
     loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))
     try:
@@ -86,7 +86,7 @@ def inwards(loop: SmallLoop, size: float = 0.3, fingers: float = 0.0) -> None:
     loop.setpoint = lambda t: start + away(t) + closing * max(t - start_time, 0.0)
 
 
-def cut(server: EmulatorServer, loop: SmallLoop, *, hangs: bool) -> float:
+def cut(server: FaultyServer, loop: SmallLoop, *, hangs: bool) -> float:
     """Reset the connection, or let the arm hang, and wait until the loss is reported.
 
     Returns the time from then to the last tick whose report still had the arm connected [s]. A busy

@@ -23,10 +23,10 @@ from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm, joints_at
-from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.link import ArmUrl
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
+from tests.real_arm.emulated import FaultyServer
 from tests.real_arm.paper_arm import ENDS, JOINTS
 
 
@@ -74,7 +74,7 @@ def operator(request: pytest.FixtureRequest) -> Iterator[Operator]:
     chance = random.Random(450)
     delay = (lambda: chance.uniform(0.03, 0.05)) if request.param == "slow" else (lambda: 0.0)
     arm = EmulatedArm(calibration_scale=60.0)
-    server = EmulatorServer(arm, "127.0.0.1", 0, delay)
+    server = FaultyServer(arm, delay)
     server.start()
     session = describe_robot(Settings(), URDF_PATH, None).session
     operator = Operator(session, KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))

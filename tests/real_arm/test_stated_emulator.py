@@ -15,7 +15,7 @@ from katana450.extensions.real_arm.emulator.axis import COLLISION_LIMIT
 from katana450.extensions.real_arm.emulator.firmware import Firmware
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from tests.conftest import LONG
-from tests.real_arm.emulated import Bench, linked
+from tests.real_arm.emulated import Bench, FaultyServer, linked
 
 
 @pytest.mark.parametrize(("axis", "factor"), [(1, -1.0), (2, -1.0), (3, -2.0), (4, -1.0), (5, 1.0)])
@@ -68,7 +68,7 @@ def test_lost_connection_stops_no_motion() -> None:
 
 def test_replies_are_late_and_the_arm_moves_meanwhile() -> None:
     delays = iter([0.0, 0.03, 0.05])
-    server = EmulatorServer(EmulatedArm(calibrated=True), "127.0.0.1", 0, lambda: next(delays))
+    server = FaultyServer(EmulatedArm(calibrated=True), lambda: next(delays))
     server.start()
     try:
         with linked(server.port) as link:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import select
 import signal
 import socket
-import struct
 import threading
 import time
 from argparse import Namespace
-from collections.abc import Callable
 from contextlib import suppress
 
 from katana450.arm.robot.loader import load
@@ -48,32 +46,20 @@ class EmulatorServer:
         port: port on which it listens.
     """
 
-    def __init__(
-        self,
-        arm: EmulatedArm,
-        host: str,
-        port: int,
-        reply_delay: Callable[[], float] = lambda: 0.0,
-    ) -> None:
-        """Open a port. Raises ConfigurationError if it is taken.
+    def __init__(self, arm: EmulatedArm, host: str, port: int) -> None:
+        """Open a port for ``arm``. Raises ConfigurationError if it is taken.
 
-        Args:
-            arm: the arm that is served.
-            host: address of this machine.
-            port: 0 for any free one.
-            reply_delay: returns the time by which the next reply is late [s]; for tests.
+        ``host``: address of this machine. ``port``: 0 for any free one.
         """
         self.arm = arm
         self.lock = threading.Lock()
         self._firmware = Firmware(arm)
-        self._reply_delay = reply_delay
         self._listening = listen(host, port)
         self._listening.setblocking(False)
         self.port: int = self._listening.getsockname()[1]
         self._client: socket.socket | None = None
         self._codec = FirmwareCodec()
         self._ending = threading.Event()
-        self._dropping = threading.Event()
         self._now = time.monotonic()
         self._thread = threading.Thread(target=self.run, name="emulator", daemon=True)
 
@@ -92,10 +78,6 @@ class EmulatorServer:
         if self.is_running:
             self._thread.join()
 
-    def drop_client(self) -> None:
-        """Reset the connection to the client, if there is one, within a turn of ``run``."""
-        self._dropping.set()
-
     def run(self) -> None:
         """Serve until ``stop``."""
         self._now = time.monotonic()
@@ -112,9 +94,6 @@ class EmulatorServer:
         readable, _, _ = select.select([waited], [], [], IDLE)
         with self.lock:
             self._advance()
-            if self._dropping.is_set():
-                self._dropping.clear()
-                self._reset()
             if readable and client is self._client:
                 if client is None:
                     self._accept()
@@ -150,35 +129,12 @@ class EmulatorServer:
 
     def _send(self, client: socket.socket, reply: bytes) -> bool:
         """Send ``reply``; return False if the connection has ended."""
-        self._wait(self._reply_delay())
-        if self._client is not client:
-            return False
         try:
             client.sendall(reply)
         except OSError:
             self._drop()
             return False
         return True
-
-    def _wait(self, delay: float) -> None:
-        """Move the arm for ``delay`` [s] before a reply is sent."""
-        end = time.monotonic() + delay
-        while (left := end - time.monotonic()) > 0.0 and not self._ending.is_set():
-            # Others may look at the arm meanwhile.
-            self.lock.release()
-            try:
-                time.sleep(min(left, IDLE))
-            finally:
-                self.lock.acquire()
-            self._advance()
-
-    def _reset(self) -> None:
-        """Close the connection so that the client sees a reset."""
-        if self._client is not None:
-            with suppress(OSError):
-                linger = struct.pack("ii", 1, 0)
-                self._client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
-        self._drop()
 
     def _drop(self) -> None:
         if self._client is not None:
