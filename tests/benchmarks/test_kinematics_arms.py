@@ -65,6 +65,7 @@ def test_closed_form_and_search_solve_the_poses() -> None:
     assert len(list(report.single_table(rows))) == 4
 
 
+@pytest.mark.long
 def test_singular_task_is_singular_and_solved() -> None:
     task = UR5E.task(singular_postures(30, UR5E.elbow))
     (row,) = measured(UR5E, [CLOSED[0]], task, 1, NOWHERE)

@@ -122,6 +122,7 @@ def test_time_that_is_no_number_is_refused(
     assert expected in capsys.readouterr().err
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ["settings", "urdf", "urdf_sha256", "utc_offset_ns", "robot"])
 def test_changed_metadata_are_refused_or_exported(run: Path, tmp_path: Path, name: str) -> None:
     for number, text in enumerate(TEXTS):

@@ -25,7 +25,6 @@ from tests.general_arms.published_arms import (
     KR_6,
     OPENMANIPULATOR_X,
     PANDA,
-    PINCHERX_100,
     SKEWED_6,
     UR5E,
 )
@@ -115,12 +114,12 @@ def of_three_axes() -> Chain:
 
 @pytest.mark.parametrize(
     "chain",
-    [of_three_axes(), PINCHERX_100, OPENMANIPULATOR_X, SKEWED_6],
-    ids=["3 axes", "4 axes", "4 more axes", "numerical"],
+    [of_three_axes(), OPENMANIPULATOR_X, SKEWED_6],
+    ids=["3 axes", "4 axes", "numerical"],
 )
 def test_other_arms_reach_the_voxels_of_their_postures(chain: Chain) -> None:
     every = reachability(chain)
-    size = every.reach / 10.0
+    size = every.reach / 7.0
     centers = every.reached(voxel_ranges(every.middle, every.reach, size, DEEP), size)
     points = in_base(every, np.array([forward(chain, q)[:3, 3] for q in inside(chain, 40, 8)]))
     apart = np.abs(points[:, None] - centers).max(axis=2).min(axis=1)
@@ -128,7 +127,7 @@ def test_other_arms_reach_the_voxels_of_their_postures(chain: Chain) -> None:
     assert np.linalg.norm(centers - every.middle, axis=1).max() <= every.reach + size
 
 
-@pytest.mark.parametrize("chain", [OPENMANIPULATOR_X, UR5E])
+@pytest.mark.parametrize("chain", [OPENMANIPULATOR_X, pytest.param(UR5E, marks=pytest.mark.long)])
 def test_map_has_fractions(chain: Chain) -> None:
     reach_map = reachability_map(chain, STAND, 0.0, 0.3 if chain.n > 4 else 0.08)
     assert len(reach_map.points) > 10
