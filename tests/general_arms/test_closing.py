@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from katana450.extensions.hands.sides import with_sides
 from katana450.extensions.programs.run.simulation import Planned, run_by_clock
 from katana450.maths.geometry import se3
 from katana450.server.service import serialize
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.settings import Settings
 from tests.general_arms.published_hands import (
     HOOK,
@@ -133,7 +136,8 @@ def test_answer_and_description_name_the_closed_end_first(tmp_path: Path) -> Non
     path = tmp_path / "arm.urdf"
     path.write_text(hand_urdf("UR5e", ROBOTIQ_2F_85), encoding="utf-8")
     robot, session, _ = find_robot(Settings(), path, None)
-    assert serialize.arm(robot, session.ready.tolist(), None).gripper == (0.8, 0.0, 2.0)
+    handle = cast("ArmHandle", SimpleNamespace(robot=robot, session=session))
+    assert serialize.arm(handle).gripper == (0.8, 0.0, 2.0)
 
 
 def test_hand_that_is_not_understood_closes_at_the_lower_end(tmp_path: Path) -> None:

@@ -340,7 +340,6 @@ class Arm(Answer, frozen=True, kw_only=True):
         links: (n,) The link that each joint moves.
         joints_only: Reason for which no tool can be moved to a pose; empty where one can.
         freedoms: Number of numbers in ``jog`` and ``step_tool``, 5 or 6; 0 without tools.
-        touch: Whether states have ``touch``, the forces of the fingers.
         turns_elbow: Whether ``turn_elbow``, and the seventh rate of a ``jog``, move the elbow.
     """
 
@@ -361,7 +360,6 @@ class Arm(Answer, frozen=True, kw_only=True):
     links: list[JointLink]
     joints_only: str
     freedoms: int = 0
-    touch: bool = False
     turns_elbow: bool = False
 
 

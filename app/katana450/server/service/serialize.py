@@ -232,7 +232,7 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
 
 def arm(handle: ArmHandle) -> answers.Arm:
     """Return the description of the arm of ``handle``."""
-    robot, mounted, hand = handle.robot, handle.robot.arm, handle.environment.hand
+    robot, mounted = handle.robot, handle.robot.arm
     model = robot.joint_group if mounted is None else mounted
     names = robot.joint_group.names if mounted is None else mounted.chain.names
     limits, gripper = model.limits, model.gripper
@@ -254,7 +254,6 @@ def arm(handle: ArmHandle) -> answers.Arm:
         links=_joint_links(robot, names),
         joints_only=robot.why,
         freedoms=0 if mounted is None else mounted.kinematics.freedoms,
-        touch=hand is not None and hand.can_hold,
         turns_elbow=mounted is not None and mounted.kinematics.turns_elbow,
     )
 
