@@ -125,11 +125,6 @@ class Extension:
         commands: Commands of ``katana450``.
         prepare: Completes the options of a command before it runs, whichever extension it is of.
             Raises KatanaError.
-        hand: Returns the hand of a robot, given its collision world and the hand, completed by its
-            sides and its closed end. Called for each session of an arm, in the order of the
-            extensions.
-        find_arm: Returns the arm outside the five-axis family in a URDF, with its kinematics, or
-            None; see ``FindArm``. Called when a robot is read for ``serve``.
         serve_options: Adds options to the parser of ``serve``.
         initial_scene: Returns the InitialScene according to the options, or None. Its second
             argument returns the session of the robot, and raises RobotDescriptionError if the robot
@@ -152,8 +147,6 @@ class Extension:
     name: str
     commands: tuple[CliCommand, ...] = ()
     prepare: Target | None = None
-    hand: Target | None = None
-    find_arm: Target | None = None
     serve_options: Target | None = None
     initial_scene: Target | None = None
     view_layer: Target | None = None

@@ -13,7 +13,7 @@ from katana450.arm.control.objects.pouring import CUP
 from katana450.arm.control.state.scene_objects import named
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import load_props
-from katana450.assembly.robot_session import describe_robot, find_arm
+from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.building.actions import FollowPlan
@@ -91,7 +91,7 @@ def planned(tmp_path: Path, name: str, pour: str) -> Planned:
         "home",
     )
     script = parse("frame: base\nsteps:\n" + "".join(f"  - {step}\n" for step in steps))
-    robot, session, _ = describe_robot(Settings(), path, None, find_arm)
+    robot, session, _ = describe_robot(Settings(), path, None)
     start = session.begin(session.ready, 0.0, 0.0)
     context = PlanContext(session, robot.require_arm().T_base_shoulder)
     return Planned(script, compiled(script, context, start), robot, session, start)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from katana450.arm.control.objects.environment import Hand
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
-from katana450.arm.robot.arm_reader import FindArm, OtherArm
+from katana450.arm.robot.arm_reader import OtherArm
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table
 from katana450.arm.robot.props import load_props, water_environment
@@ -17,13 +17,19 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.urdf import Urdf
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError
-from katana450.extension import load, provided, results
+from katana450.extension import load
 from katana450.maths.collision.world import CollisionWorld
 from katana450.settings import Settings
 
 WORLD = "katana450.extensions.bodies.robot_world:robot_world"
 """Function that returns the collision world of a robot, None without shapes, sentences on what it
 leaves out, and cautions for its driver."""
+
+HAND = "katana450.extensions.hands.sides:with_sides"
+"""Function that completes the hand of an arm in its collision world by its sides."""
+
+OTHER_ARM = "katana450.extensions.general_arms.driven_tool:driven_arm"
+"""Function that finds the arm outside the five-axis family in a URDF; see ``FindArm``."""
 
 
 class DescribedRobot(NamedTuple):
@@ -34,20 +40,19 @@ class DescribedRobot(NamedTuple):
     notes: tuple[str, ...]
 
 
-def describe_robot(
-    settings: Settings, urdf: Path, tool: str | None, find: FindArm | None = None
-) -> DescribedRobot:
+def describe_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:
     """Return the robot with an arm in the file ``urdf``.
 
-    ``tool``: the link to which targets refer. ``find``: see ``load``. Raises RobotDescriptionError
-    for a robot without an arm.
+    ``tool``: the link to which targets refer. Raises RobotDescriptionError for a robot without an
+    arm.
     """
-    return arm_session(settings, read_robot(urdf, tool, find))
+    return arm_session(settings, read_robot(urdf, tool, find_arm))
 
 
 def find_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
-    """Return the arm outside the five-axis family that an extension finds; None if none does."""
-    return next(results("find_arm", urdf, path, tool), None)
+    """Return the arm outside the five-axis family in ``urdf``; None if there is none."""
+    arm: OtherArm | None = load(OTHER_ARM)(urdf, path, tool)
+    return arm
 
 
 def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:
@@ -79,9 +84,7 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
     hand: Hand | None = None
     objects: tuple[SceneObject, ...] = ()
     if world is not None:
-        hand, objects = hand_of(robot, world), scene_objects_of(props)
-        for complete in provided("hand"):
-            hand = complete(world, hand)
+        hand, objects = load(HAND)(world, hand_of(robot, world)), scene_objects_of(props)
         if hand.gripper != arm.gripper:
             robot = replace(robot, arm=replace(arm, gripper=hand.gripper))
         world = world.with_obstacles((table(),))

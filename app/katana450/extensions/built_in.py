@@ -140,7 +140,6 @@ EXTENSIONS = (
         view_layer=f"{HERE}.real_arm.options:view_layer",
         driver=f"{HERE}.real_arm.options:driver",
     ),
-    Extension("hands", hand=f"{HERE}.hands.sides:with_sides"),
     Extension(
         "leader",
         (
@@ -183,6 +182,5 @@ EXTENSIONS = (
     Extension("undo", handler=f"{HERE}.undo:UndoRequests"),
     Extension("conduit", view_layer=f"{HERE}.conduit.rings:ConduitLayer"),
     Extension("water", view_layer=f"{HERE}.water:WaterLayer"),
-    Extension("general_arms", find_arm=f"{HERE}.general_arms.driven_tool:driven_arm"),
 )
 """Each with where its parts are, so that nothing is imported before it is used."""

@@ -13,7 +13,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.grip import finger_forces
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import named
-from katana450.assembly.robot_session import describe_robot, find_arm
+from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.learn.tasks import TASKS, WANTED, Table
 from katana450.maths.geometry.arrays import FloatArray
@@ -61,7 +61,7 @@ class TaskEnvironment(gymnasium.Env[Numbers, Numbers]):
         if urdf is not None and task == "Pour":
             raise InputError("Pour is for the Katana450 alone. Leave `urdf` out.")
         path = URDF_PATH if urdf is None else Path(urdf)
-        robot, self._session, _ = describe_robot(Settings(), path, None, find_arm)
+        robot, self._session, _ = describe_robot(Settings(), path, None)
         self._arm, self._task, self._names = robot.require_arm(), task, TASKS[task]
         hand = self._session.environment.hand
         if hand is None or not hand.can_hold:

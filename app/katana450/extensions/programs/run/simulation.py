@@ -19,7 +19,7 @@ from katana450.arm.drivers.driver import Driver
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.tick import driven
-from katana450.assembly.robot_session import describe_robot, find_arm
+from katana450.assembly.robot_session import describe_robot
 from katana450.caching import cached_property
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.programs.building.actions import FollowPlan
@@ -158,7 +158,7 @@ def plan_script(
     Raises ScriptError, and InputError if the arm cannot begin so.
     """
     settings = replace(Settings(), bare=script.bare)
-    robot, session, _ = describe_robot(settings, urdf, None, find_arm)
+    robot, session, _ = describe_robot(settings, urdf, None)
     plan_context = PlanContext(session, robot.require_arm().T_base_shoulder, seed)
     if begin is None:
         begin = ready if script.scene is None else script.scene.begin
