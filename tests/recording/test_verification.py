@@ -13,7 +13,8 @@ import pytest
 
 import katana450
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.state.state import Reason
+from katana450.arm.control.state.state import Reason, State
+from katana450.arm.control.state.stop_cause import UNNAMED, pressed
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import Submission, TickRecord, stepped
 from katana450.assembly.robot_session import find_robot
@@ -32,6 +33,7 @@ from katana450.settings import Settings
 from tests.conftest import LONG
 from tests.recording.dataset_files import write_copy
 from tests.recording.recorded import ADA, described, fresh, header, record, run
+from tests.recording.sessions import record_session
 
 TICKS = 3000 if LONG else 600
 GANTRY = Path(__file__).parents[1] / "exchange" / "gantry.urdf"
@@ -78,6 +80,20 @@ def test_every_part_is_identical_from_its_first_complete_state(
         assert result.identical, result
         assert result.ticks > 50
         assert result.unknown == 0
+
+
+def test_name_that_comes_after_the_stop_is_simulated(tmp_path: Path) -> None:
+    def commands(tick: int, _state: State) -> Iterator[cmd.Command]:
+        if tick in {5, 8}:
+            # As the process of STOP sends it, and then the server, which knows the name.
+            yield cmd.Stop(pressed(UNNAMED if tick == 5 else "Ada", ADA.key, "press", float(tick)))
+
+    path = record_session(tmp_path / "run.mcap", 12, commands)
+    with RecordingFile.open(path) as file:
+        (named,) = [m for m in file.messages(COMMANDS) if b'"named"' in m.data]
+        assert b'"by":"Ada"' in named.data
+        assert b"session-of-ada" not in named.data
+        assert verify_recording(file, fresh().session) == Verification(5)
 
 
 def test_identities_of_people_are_not_in_the_file(path: Path, records: list[TickRecord]) -> None:

@@ -117,14 +117,16 @@ class ControlLoop:
             log.exception("The control loop met an error; the arm holds.")
             state, has_failed = failed(before, commands), True
             self._put_stops_again(drained)
-        self._state = state = with_name(state, drained.repeated.values())
+        nameless, state = state, with_name(state, drained.repeated.values())
+        self._state = state
         for command, outcome in zip(commands, state.outcomes, strict=False):
             if isinstance(command, Stop):
                 self._driver.freeze(t)
             elif isinstance(command, OperateArm) and outcome.verdict is not Verdict.REFUSED:
                 self._driver.perform(command.act, t)
         if self.record is not None and state is not before:
-            self.record(TickRecord(before.t, t, drained.submissions, has_failed, state))
+            named = state is not nameless
+            self.record(TickRecord(before.t, t, drained.submissions, has_failed, state, named))
         # A state that differs only in its time is not published.
         changed = is_given or _differs(before, state)
         self._resting = not (changed or state.moving or state.objects_move)

@@ -39,6 +39,7 @@ class TickRecord(NamedTuple):
         submissions: its commands as taken from the mailbox, with who gave each.
         failed: whether an internal error made the arm hold.
         state: the state after it, with the driver's answer in ``q`` and ``gripper``.
+        named: whether a later copy of a press of STOP named its presser in ``state``.
     """
 
     t_before: float
@@ -46,6 +47,7 @@ class TickRecord(NamedTuple):
     submissions: Sequence[Submission]
     failed: bool
     state: State
+    named: bool = False
 
 
 def stepped(session: Session, state: State, commands: list[Command], t: float, send: Send) -> State:

@@ -83,6 +83,7 @@ class TickMessage(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
         commands: its commands as the loop took them, with who gave each.
         sent: the answer of the driver; None if it is the setpoint.
         failed: whether an internal error made the arm hold.
+        named: cause of the stop, if a later copy of its press named the presser.
         digest: digest of the state after it.
         missing: why this tick, and ``ticks`` before the next, cannot be simulated.
         ticks: number of missing ticks.
@@ -93,6 +94,7 @@ class TickMessage(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     commands: Annotated[tuple[GivenCommand, ...], Meta(max_length=MAX_COMMANDS)] = ()
     sent: SentAnswer | None = None
     failed: bool = False
+    named: Form = None
     digest: str = ""
     missing: str | None = None
     ticks: int = 1

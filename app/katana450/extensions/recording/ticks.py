@@ -24,11 +24,13 @@ import numpy as np
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands.commands import Command
 from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.stopping import with_name
 from katana450.arm.control.state.arm_report import ArmReport
 from katana450.arm.control.state.following import Following
 from katana450.arm.control.state.modes import Leaving, Mode, Positioning, Tracking
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
+from katana450.arm.control.state.stop_cause import StopCause
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped
 from katana450.errors import InputError, KatanaError
@@ -118,6 +120,7 @@ class TickInput:
     submissions: tuple[Submission, ...]
     sent: DriverAnswer | None
     failed: bool
+    named: StopCause | None
     digest: str
 
 
@@ -144,6 +147,7 @@ def tick_message(
         ),
         sent,
         record.failed,
+        codec.encoded(state.stopped.cause) if record.named and state.stopped else None,
         digest,
     )
 
@@ -172,10 +176,13 @@ def tick_input(codec: Codec, message: TickMessage) -> TickInput:
             )
         except FormError as error:
             raise error.within("sent") from None
+    try:
+        named = codec.decoded(StopCause | None, message.named)
+    except FormError as error:
+        raise error.within("named") from None
     # Its times are finite, as all numbers of JSON: compiled code of the simulation needs that.
-    return TickInput(
-        message.t, message.t_before, tuple(submissions), sent, message.failed, message.digest
-    )
+    t, t_before = message.t, message.t_before
+    return TickInput(t, t_before, tuple(submissions), sent, message.failed, named, message.digest)
 
 
 @dataclass(frozen=True)
@@ -236,14 +243,15 @@ def after(session: Session, before: State, tick: TickInput) -> State:
     commands = [submission.command for submission in tick.submissions]
     if tick.t_before is not None:
         before = replace(before, t=tick.t_before)
+    names = () if tick.named is None else (tick.named,)
     if tick.failed:
-        return failed(before, commands)
+        return with_name(failed(before, commands), names)
 
     def send(q: FloatArray, gripper: float, _t: float, _stopped: bool) -> DriverAnswer:
         return DriverAnswer(q, gripper) if tick.sent is None else tick.sent
 
     try:
-        return stepped(session, before, commands, tick.t, send)
+        return with_name(stepped(session, before, commands, tick.t, send), names)
     except KatanaError as error:
         raise InputError(f"The tick at t = {tick.t:.3f} s was refused: {error}") from error
     except Exception as error:
