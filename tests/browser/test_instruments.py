@@ -50,7 +50,7 @@ def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, trut
     page.wait_until(lambda: abs(truth.status()["q"][0] - end) < 1e-4, "the end of the turn")
 
     def is_plotted() -> bool:
-        return abs(table(page, "joint-angles")["Axis 1 [deg]"][-1] - reached) < 0.01
+        return bool(abs(table(page, "joint-angles")["Axis 1 [deg]"][-1] - reached) < 0.01)
 
     page.wait_until(is_plotted, "the end in the plot")
     grown = table(page, "joint-angles")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -39,7 +40,8 @@ async def test_request_whose_sender_is_removed_before_its_end_is_refused(
             guarded.hub.people.kick(Identity(number, "Oda", Role.OPERATOR), 60.0)
 
     async def do(what: str, meanwhile: Callable[[], object] = lambda: None) -> int:
-        body, names = b'{"do": "%s"}' % what.encode(), {"X_Program": "a-program-of-this-test"}
+        body = b'{"do": "%s"}' % what.encode()
+        names: dict[str, Any] = {"X_Program": "a-program-of-this-test"}
         names["Authorization"] = f"Bearer {token}"
         return (await guarded.request("/api/v1/do", body, meanwhile=meanwhile, **names))[0]
 

@@ -150,7 +150,8 @@ def test_stop_of_anybody_ends_the_wait(local: VirtualServer, watcher: Client) ->
 def test_closed_connection_stops_the_arm(local: VirtualServer, watcher: Client) -> None:
     slow(watcher)
     body = json.dumps({"do": "joints", "q": THERE.tolist(), "wait": 30}).encode()
-    names, leaves = {"X_Name": "Broken", "X_Program": "a-program-that-leaves"}, asyncio.Event()
+    names: dict[str, Any] = {"X_Name": "Broken", "X_Program": "a-program-that-leaves"}
+    leaves = asyncio.Event()
     sent = local.loop.create_task(local.request("/api/v1/do", body, leaves, **names))
     state_when(watcher, under_way)
     leaves.set()
