@@ -58,12 +58,15 @@ class SenderBuckets:
         ``maximum``: number of buckets that are kept; a new one replaces the oldest. ``total``: the
         bucket for all senders together; None for none.
         """
-        self._bounds, self._debt, self._maximum, self._total = (rate, size), debt, maximum, total
+        self._rate, self._size, self._debt = rate, size, debt
+        self._maximum, self._total = maximum, total
         self._buckets: dict[str, TokenBucket] = {}
 
     def bucket_of(self, sender: str, t: float) -> TokenBucket:
         """Return the bucket of ``sender``, which is filled at time ``t`` [s] if it is new."""
-        bucket = self._buckets.pop(sender, None) or TokenBucket(*self._bounds, t, self._debt)
+        bucket = self._buckets.pop(sender, None)
+        if bucket is None:
+            bucket = TokenBucket(self._rate, self._size, t, self._debt)
         self._buckets[sender] = bucket
         if len(self._buckets) > self._maximum:
             del self._buckets[next(iter(self._buckets))]
