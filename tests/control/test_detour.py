@@ -25,21 +25,10 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.sampling import BranchRegion, collision_free_paths
-
-TICK = 0.01
+from tests.ticks import TICK, rested
 
 TARGET = np.array((0.008, 0.025, 0.443))
 """[m] A point above the shoulder. A drag there from the ready posture ends at limits."""
-
-
-def settled(session: Session, state: State, *commands: cmd.Command) -> State:
-    """Return ``state`` after ``commands``, once the arm is at rest."""
-    state = session.step(state, commands, state.t + TICK)
-    for _ in range(2000):
-        if not state.moving and state.since is None:
-            return session.observe(state, state.setpoint, state.gripper_setpoint)
-        state = session.step(state, (), state.t + TICK)
-    raise AssertionError("The arm does not come to rest.")
 
 
 def offer(session: Session, state: State) -> cmd.OfferDetour:
@@ -50,7 +39,7 @@ def offer(session: Session, state: State) -> cmd.OfferDetour:
 @pytest.fixture
 def held(shipped: Session) -> State:
     """The shipped arm at the edge of a gap, with the hand still on the handle."""
-    state = settled(shipped, shipped.begin(shipped.ready, 0.0, 0.0), cmd.Position(TARGET))
+    state = rested(shipped, shipped.begin(shipped.ready, 0.0, 0.0), cmd.Position(TARGET))
     assert state.status is Status.GAP
     assert state.detour is None
     return state
@@ -119,7 +108,7 @@ def test_go_arrives_on_the_same_branch(shipped: Session, offered: State, let_go:
 def test_detour_can_be_offered_after_the_drag_ended(shipped: Session, held: State) -> None:
     state = shipped.step(held, [cmd.EndDrag()], held.t + TICK)
     state = shipped.step(state, [offer(shipped, state)], state.t + TICK)
-    state = settled(shipped, state, cmd.Go())
+    state = rested(shipped, state, cmd.Go())
     np.testing.assert_allclose(point(shipped, state), TARGET, rtol=0, atol=1e-6)
 
 
