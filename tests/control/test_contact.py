@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.motion_stepper import met_before_rest
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.modes import JointTarget
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.maths.collision.clearance import MIN_CLEARANCE
+from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.curve import JointCurve
+from katana450.maths.motion.limiter import JointMotion
 from tests.ticks import TICK, until_rest
 
 SLIGHTLY = 2e-5  # m
@@ -175,3 +179,41 @@ def test_braking_arm_with_a_new_target_keeps_its_finding(guarded: Session) -> No
     assert finding.parts is not None
     assert all(parts is not None and "table" in parts for parts in named), named
     assert finding.amount == pytest.approx(clearance(guarded.world, state), abs=1e-3)  # type: ignore[arg-type]
+
+
+class BrakeAside:
+    """A brake that turns axis 1 aside by an angle [rad], and back."""
+
+    def __init__(self, angle: float) -> None:
+        self.turn = np.array((angle, 0.0, 0.0, 0.0, 0.0))
+
+    def stopping_range(self, now: JointMotion) -> tuple[FloatArray, FloatArray]:
+        return now.q - np.abs(self.turn), now.q + np.abs(self.turn)
+
+    def stopping_path(self, now: JointMotion, *_: object) -> list[JointCurve]:
+        there_and_back = JointCurve(
+            lambda part: now.q + self.turn * (1.0 - abs(2.0 * part - 1.0)),
+            lambda _low, _high: np.zeros(5),
+        )
+        return there_and_back.pieces(16)
+
+
+def test_brake_that_comes_too_near_and_leaves_again_is_a_contact(guarded: Session) -> None:
+    world = guarded.world
+    assert world is not None
+    x = np.append(LOW, 0.0)
+
+    def distance(angle: float) -> float:
+        contact = world.nearest(x + angle * np.eye(6)[0])
+        assert contact is not None
+        return contact.distance
+
+    def met(angle: float) -> Contact | None:
+        brake = BrakeAside(angle)
+        return met_before_rest(world, brake, x, JointMotion.rest(LOW))  # type: ignore[arg-type]
+
+    near = next(angle for angle in np.arange(0.0, -1.0, -1e-4) if distance(angle) < MIN_CLEARANCE)
+    assert met(near + 0.01) is None
+    contact = met(near - 0.001)
+    assert contact is not None
+    assert "cup" in contact.parts

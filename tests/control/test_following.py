@@ -276,6 +276,21 @@ def test_stop_beside_the_cup_keeps_clear_of_it(
         assert away[-1].following is None
 
 
+def test_plan_is_not_clear_with_wider_fingers(
+    arm: ArmModel, world: CollisionWorld, guarded: Session
+) -> None:
+    closed, opened = arm.gripper.closed, arm.gripper.opened
+    narrow = guarded.begin(LOW, closed, 0.0)
+    beside_cup = until_rest(guarded, narrow, cmd.Joint(1, -0.6))[-1].setpoint
+    # As near as the closed fingers can plan to come.
+    goal = beside_cup + 0.03 * np.eye(5)[0]
+    plan = plan_to(arm, world, narrow, goal)
+    assert (until_rest(guarded, narrow, cmd.Follow(plan))[-1].setpoint == goal).all()
+    states = until_rest(guarded, guarded.begin(LOW, opened, 0.0), cmd.Follow(plan))
+    assert states[-1].status is Status.BLOCKED
+    assert min(clearance(world, state) for state in states) >= MIN_CLEARANCE - MAX_UNCHECKED_PATH
+
+
 def test_obstacle_added_after_planning_is_met_at_rest(
     arm: ArmModel, world: CollisionWorld, guarded: Session
 ) -> None:
