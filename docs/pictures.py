@@ -76,15 +76,14 @@ def gallery(page: ViserPage) -> None:
     """Make one picture per theme, with a row for each pose and a column for each camera."""
     page.page.set_viewport_size({"width": 1300, "height": 980})
     for theme in ("Light", "Dark"):
-        page.open_tab("Scene")
-        page.click_button(theme)
+        page.page.click("#more-button")
+        page.page.get_by_label("Theme", exact=True).select_option(theme)
+        page.page.click("#more-button")
         rows = []
         for pose in POSES.values():
-            page.open_tab("Drive")
             for number, angle in enumerate(pose):
                 page.type_number(AXES[number], angle)
             at_rest(page)
-            page.open_tab("Scene")
             row = []
             for preset in VIEWS:
                 if preset is Preset.TOOL:

@@ -10,16 +10,6 @@ export function element(id, kind) {
   return match;
 }
 
-/** Return a button. @param {string} label @param {() => void} act */
-export function button(label, act, main = false) {
-  const control = document.createElement("button");
-  control.type = "button";
-  control.textContent = control.title = label;
-  control.classList.toggle("main", main);
-  control.addEventListener("click", act);
-  return control;
-}
-
 /** Call `act` for each click on the element with an id. @param {string} id @param {() => void} act */
 export const onClick = (id, act) => element(id, HTMLElement).addEventListener("click", act);
 

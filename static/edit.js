@@ -27,7 +27,7 @@ function step(what) {
 
 /** Return whether the key was handled. @param {KeyboardEvent} event */
 export function key(event) {
-  // Teach undoes its own changes.
+  // The sheet of programs undoes its own changes.
   if (event.type !== "keydown" || event.altKey || closest(event.target, "#teach")) return false;
   // The letter on the key, which is elsewhere on other keyboards; the place of the key if it has no such letter.
   const letter = (/^[a-z]$/i.test(event.key) ? event.key : event.code.slice(3)).toLowerCase();

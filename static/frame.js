@@ -138,11 +138,9 @@ Viser.interceptMessages({
     const choice = Viser.choiceOf(message);
     // What is seen may be the past: it cannot be dragged, and a control of the panel shows the present.
     if (Viser.hasHidden() && Viser.handles(message)) return false;
-    if (Viser.hasHidden() && Viser.controls(message) && !/^(View|Theme)$/.test(choice?.label ?? "")) outer?.katana?.live();
+    if (Viser.hasHidden() && Viser.controls(message) && choice?.label !== "View") outer?.katana?.live();
     if (choice?.label === "View") Fit.choose(choice.value);
-    if (choice?.label !== "Theme") return true;
-    Theme.choose(choice.value);
-    return false;
+    return true;
   },
   connected() {
     outer?.katana?.live?.();

@@ -5,6 +5,7 @@ import { picture } from "./viser/pictures.js";
 const NAME = "katana450.name";
 const dialog = element("more", HTMLDialogElement);
 const button = element("more-button", HTMLButtonElement);
+const theme = first("#theme select", HTMLSelectElement);
 const field = element("own-name", HTMLInputElement);
 const why = element("own-name-why", HTMLElement);
 const ID = "name"; // id of the request for a name
@@ -32,6 +33,7 @@ function ask(name) {
 function open() {
   element("phone", HTMLDialogElement).close();
   field.value = known;
+  theme.value = document.documentElement.dataset.theme === "dark" ? "Dark" : "Light";
   refuse("");
   dialog.show();
   button.setAttribute("aria-expanded", "true");
@@ -59,6 +61,7 @@ export function begin(context) {
     event.preventDefault();
     ask(field.value);
   });
+  theme.addEventListener("change", async () => (await import("./theme.js")).choose(theme.value));
   onClick("snapshot", snapshot);
   onClick("keep-recording", async () => {
     const { keep } = await import("./more/keep.js");

@@ -20,19 +20,12 @@ function nameOfInput(control) {
   return label.includes(LIST) ? label.split(LIST)[index] : label;
 }
 
-/** @param {Element} button */
-function nameOfButton(button) {
-  if (button.closest("[role=alert]")) return "Close this message";
-  const input = button.parentElement?.parentElement?.querySelector("input");
-  return input ? "Pick a colour from the screen" : "Settings of the display";
-}
-
 function nameAll() {
   waiting = false;
   for (const control of document.querySelectorAll("input:not([type=hidden]), [role=slider]"))
     if (isNameless(control)) control.setAttribute("aria-label", nameOfInput(control));
   for (const button of document.querySelectorAll("button:not([aria-hidden])"))
-    if (isNameless(button) && !button.textContent) button.setAttribute("aria-label", nameOfButton(button));
+    if (isNameless(button) && !button.textContent) button.setAttribute("aria-label", button.closest("[role=alert]") ? "Close this message" : "Settings of the display");
 }
 
 new MutationObserver(() => {

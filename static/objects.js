@@ -1,5 +1,6 @@
 // Objects and scenes from files: the server reads a file, and the object is placed where it was dropped, or before the arm.
-import { button, element, save } from "./dom.js";
+import { element, save } from "./dom.js";
+import { button } from "./instruments/shape.js";
 import { chooseRobot } from "./more.js";
 
 const API = "api/v1/";
@@ -64,7 +65,7 @@ async function add(again) {
   mesh.name = again && placed ? placed : mesh.name;
   report(`${mesh.name}: ${mesh.text}`);
   if (mesh.scale === 1) {
-    // A unit that fits replaces a scale that was chosen to fit, but not one that was set in the panel.
+    // A unit that fits replaces a scale that was chosen to fit, but not one that was set for the object.
     place(mesh, fitted ? 1 : undefined);
     fitted = false;
     return;
@@ -157,6 +158,18 @@ export function begin(page) {
   onChoice("object-file", take);
   onChoice("object-folder", take);
   onChoice("scene-file", ([first]) => load(first));
+}
+
+/** @type {Promise<import("./objects/object.js").ObjectForm> | null} */
+let form = null; // of the chosen object
+
+/** Note that the sheet is shown, or hidden. @param {boolean} shown */
+export async function show(shown) {
+  if (!shown && !form) return;
+  form ??= import("./objects/object.js").then(({ ObjectForm }) => new ObjectForm(say));
+  const chosen = await form;
+  if (!chosen.element.isConnected) byId("objects").append(chosen.element);
+  chosen.watch(!byId("objects").hidden);
 }
 
 // Read files that were chosen or dropped: one object or several, or a scene in a .zip file. `entries` are the dropped

@@ -49,7 +49,7 @@ const stopPress = new StopPress(page, () => {
 });
 const bar = new Bar(page, stopPress, withNames);
 /** @type {Parts} */
-const parts = new Parts(page, frame, () => sheets, (hz) => send({ watch: hz }));
+const parts = new Parts(page, frame, (hz) => send({ watch: hz }));
 const sheets = new Sheets(page, parts);
 const key = keyHandler(page, parts, stop);
 

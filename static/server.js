@@ -18,5 +18,8 @@ export async function request(url, options) {
 /** Return the answer `arm`. Throws an error without one. @returns {Promise<Api.Arm>} */
 export const readArm = async () => (await request("api/v1/arm")).json();
 
+/** Return all objects; none if they could not be fetched. @returns {Promise<Api.SceneObject[]>} */
+export const readObjects = () => request("api/v1/objects").then(async (answer) => (await answer.json()).objects).catch(() => []);
+
 /** Return the state; null if it could not be fetched. @returns {Promise<Api.State | null>} */
 export const readState = () => request("api/v1/state").then((answer) => answer.json()).catch(() => null);

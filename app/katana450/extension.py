@@ -134,7 +134,7 @@ class Extension:
         routes: Returns routes for the web server, below ``/api/v1``, given a RouteContext.
         handler: Class that answers further requests.
         step: A script step, a class derived from ``Step``. Other steps of its module are added too.
-        folder: Adds controls to a tab of the panel, given a FolderContext, and returns them, or
+        folder: Adds a folder to the panel or nodes to the scene, given a FolderContext, or returns
             None. Called also for a robot without an arm. Raises KatanaError.
         process: Returns a further process of the server, given the options and a ServerFacts, or
             None.

@@ -1,5 +1,5 @@
 // Episodes: REC, the judgement of attempts, and their list. Loaded when the server records.
-import { element, first, styled, write } from "../dom.js";
+import { element, styled, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 
 /** @typedef {Page.Outcome} Outcome */
@@ -68,7 +68,7 @@ export class Episodes {
     this.#list.addEventListener("focusout", () => setTimeout(() => this.#fill()));
     const task = html("label", { class: "task" }, "Task", this.#task);
     this.sheet = html("section", { id: "episodes", class: "sheet", "aria-label": "Episodes", hidden: "" }, task, this.#rec, this.#says, this.#acts, this.#list, this.#about);
-    first("#toast", HTMLElement, page.stage).before(this.sheet);
+    element("dock", HTMLElement).append(this.sheet);
     new MutationObserver(() => this.#show()).observe(this.sheet, { attributeFilter: ["hidden"] });
   }
 

@@ -1,5 +1,6 @@
 // The bar: the status of the arm in words, who drives, and the buttons for it.
-import { button, element, write } from "../dom.js";
+import { element, write } from "../dom.js";
+import { button } from "../instruments/shape.js";
 import * as Pace from "../pace.js";
 import { leaseControls, replaceKeepingFocus } from "./lease.js";
 import { clock } from "./words.js";
@@ -120,8 +121,8 @@ export class Bar {
     const [name, step, steps] = status.continues;
     const controls = status.orders.map((order) => {
       const resumes = order === "continue";
-      const control = button(resumes ? `Continue ${name}` : status.planning ? "Cancel" : "End", () => this.#page.say({ do: "steer", order }), resumes);
-      if (resumes) control.title = `Continue ${name} at step ${step} of ${steps}`;
+      const control = button(resumes ? `Continue ${name}` : status.planning ? "Cancel" : "End", () => this.#page.say({ do: "steer", order }));
+      if (resumes) Object.assign(control, { className: "main", title: `Continue ${name} at step ${step} of ${steps}` });
       return control;
     });
     replaceKeepingFocus(orders, controls);

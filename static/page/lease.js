@@ -1,5 +1,7 @@
 // The buttons of the lease: take, request, give and release the arm.
-import { button } from "../dom.js";
+import { button } from "../instruments/shape.js";
+
+const MAIN = { class: "main" };
 
 /** Return the controls that a person has with this status. @param {Page.Status} status @param {Page.Say} say @returns {HTMLElement[]} */
 export function leaseControls(status, say) {
@@ -11,7 +13,7 @@ export function leaseControls(status, say) {
   /** @type {HTMLElement[]} */
   const buttons = first
     ? [
-        button(mine ? `Give to ${first.name}` : "Allow", () => say({ do: "give", to: first.number }), true),
+        button(mine ? `Give to ${first.name}` : "Allow", () => say({ do: "give", to: first.number }), { ...MAIN, title: first.name }),
         button("Refuse", () => say({ do: "decline", to: first.number })),
       ]
     : [];
@@ -20,12 +22,12 @@ export function leaseControls(status, say) {
     if (more.length) buttons.push(handOver(more, say));
     return [...buttons, button("Release", () => say({ do: "release_lease" }))];
   }
-  if (holder === null) return [button("Take", () => say({ do: "acquire" }), true)];
+  if (holder === null) return [button("Take", () => say({ do: "acquire" }), MAIN)];
   if (requests.length) return buttons;
   const free = [];
   if (asked) free.push(button("Withdraw", () => say({ do: "withdraw" })));
   // Nobody asks a program of their own.
-  else if (!status.own_program) free.push(button("Request", () => say({ do: "ask" }), true));
+  else if (!status.own_program) free.push(button("Request", () => say({ do: "ask" }), MAIN));
   if (role === "admin") free.push(button("Take over", () => say({ do: "take" })));
   return free;
 }

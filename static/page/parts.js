@@ -1,6 +1,5 @@
 // The parts of the page that are loaded when they are first used.
 import { element, onClick } from "../dom.js";
-import { OFFLINE } from "./connection.js";
 
 const OPEN = "katana450.instruments.open";
 const WELCOMED = "katana450.welcome";
@@ -15,7 +14,6 @@ const mark = (id, name, on) => element(id, HTMLButtonElement).setAttribute(name,
 export class Parts {
   #page;
   #frame;
-  #sheets;
   #watch;
   /** @type {import("../scene/stage.js").Stage | null} */
   stage = null; // what a pointer does in the scene
@@ -42,15 +40,10 @@ export class Parts {
   /** @type {Record<string, number>} */
   #rates = {}; // at which parts of the page want states [Hz]
 
-  // sheets: returns those of the page; `watch` asks for states at a rate [Hz].
-  /**
-   * @param {Page.Context} page @param {import("./first_frame.js").FirstFrame} frame
-   * @param {() => import("./sheets.js").Sheets} sheets @param {(hz: number) => void} watch
-   */
-  constructor(page, frame, sheets, watch) {
+  /** `watch` asks for states at a rate [Hz]. @param {Page.Context} page @param {import("./first_frame.js").FirstFrame} frame @param {(hz: number) => void} watch */
+  constructor(page, frame, watch) {
     this.#page = page;
     this.#frame = frame;
-    this.#sheets = sheets;
     this.#watch = watch;
     page.store.follow((status) => this.#drawEpisodes(status));
     page.store.follow((status) => this.#drawArm(status));
@@ -90,22 +83,12 @@ export class Parts {
   async enterScene() {
     await this.#frame.rest;
     const { Stage } = await import("../scene/stage.js");
-    this.stage ??= new Stage({ ...this.#page, edit: (name) => this.#editScript(name) });
+    this.stage ??= new Stage(this.#page);
   }
 
   async loadTeach() {
     this.#teachLoads ??= import("../teach/teach.js").then(({ Teach }) => Teach.in(this.#page));
     return (this.teach = await this.#teachLoads);
-  }
-
-  /** Open a script, by its name, as text in the sheet of taught poses. @param {string} name */
-  async #editScript(name) {
-    const { store, toast } = this.#page;
-    if (store.status?.role === "viewer") return toast("You may watch, not drive.");
-    if (element("teach-button", HTMLButtonElement).hidden) return toast(OFFLINE);
-    const teach = await this.loadTeach();
-    this.#sheets().open("teach");
-    teach.open(name, true);
   }
 
   /** REC, the episodes and the line of what was recorded, when the server records. @param {Page.Status} status */

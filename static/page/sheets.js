@@ -1,9 +1,10 @@
-// The sheets in the corner of the scene: Jog, Objects, Teach and Episodes.
+// The sheets of the dock: Jog, Objects, Programs and Episodes.
 import { element, sceneOf } from "../dom.js";
 import * as Jog from "../jog.js";
+import * as Objects from "../objects.js";
 
 const SHEETS = ["jog", "objects", "teach", "episodes"];
-// On a high screen Teach or Episodes have room above Jog.
+// On a high screen Programs or Episodes have room above Jog.
 const high = matchMedia("(min-width: 561px) and (min-height: 700px)");
 /** @param {string} id @param {string} other */
 const haveRoom = (id, other) => high.matches && [id, other].includes("jog") && ![id, other].includes("objects");
@@ -41,5 +42,6 @@ export class Sheets {
     if (id === "jog") Jog.show(shown);
     if (shown) sceneOf(this.#page.scene)?.fold?.();
     if (id === "teach") this.#parts.teach?.show(shown);
+    if (id === "objects") Objects.show(shown);
   }
 }

@@ -5,7 +5,6 @@ import { readArm } from "../server.js";
 import { Branches } from "./branches.js";
 import { Glow, shapesOf } from "./glow.js";
 import { Joints } from "./joints.js";
-import { Steps } from "./steps.js";
 import { Views } from "./views.js";
 
 const CLICK = 5; // px, within which a press and its release count as a click
@@ -20,7 +19,6 @@ export class Stage {
   #page;
   #joints;
   #views;
-  #steps;
   /** @type {Branches | null} */
   #branches = null; // only for an arm that has some
   /** @type {import("../selection/selection.js").Selection | null} */
@@ -33,7 +31,7 @@ export class Stage {
   #pointed = null; // node of the object under the pointer
   #glow = new Glow();
 
-  /** `page.edit` opens a script, by its name, as text. @param {Page.Context & { edit: (name: string) => void }} page */
+  /** @param {Page.Context} page */
   constructor(page) {
     const { stage, scene } = page;
     this.#stage = stage;
@@ -43,7 +41,6 @@ export class Stage {
     this.#joints = new Joints(stage, scene, page);
     this.#load();
     this.#views = new Views(stage, scene);
-    this.#steps = new Steps(page.say, page.edit);
     this.#listen();
     if (window.katana) window.katana.turned = () => this.#views.turned();
     scene.addEventListener("load", () => this.#listen());
@@ -107,7 +104,6 @@ export class Stage {
     on("blur", this.#blur);
     on("dblclick", this.#focus);
     this.#branches?.listen(inner);
-    this.#steps.listen(inner);
   }
 
   // The focus may only have moved between the two documents.

@@ -2,6 +2,7 @@
 // arrows that move it, in this window alone.
 import { sceneOf, styled, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
+import { readObjects } from "../server.js";
 
 const EVERY = 100; // ms between two updates of the frame
 const MARGIN = 6; // px
@@ -47,7 +48,7 @@ export class Selection {
   // there. Without one, select nothing.
   /** @param {number} x @param {number} y */
   async pick(x, y) {
-    const objects = await this.#objects();
+    const objects = await readObjects();
     const hit = objects
       .filter(({ held, hidden }) => !held && !hidden)
       .flatMap((object) => {
@@ -71,12 +72,6 @@ export class Selection {
     this.#show(null);
   }
 
-  /** @returns {Promise<Api.SceneObject[]>} */
-  async #objects() {
-    const answer = await fetch("api/v1/objects").catch(() => null);
-    return answer?.ok ? (await answer.json()).objects : [];
-  }
-
   /** @param {Api.SceneObject | null} object */
   #show(object) {
     if (this.#object && this.#object.name !== object?.name) this.#arrows(false);
@@ -85,6 +80,8 @@ export class Selection {
     this.#frame.hidden = !object;
     if (!object) return;
     write(this.#name, object.name);
+    // The sheet of objects, if it is open, shows the same one.
+    window.dispatchEvent(new CustomEvent("selected", { detail: object.name }));
     this.#arrows(true);
     this.#place();
     let ticks = 0;
@@ -97,7 +94,7 @@ export class Selection {
 
   async #refresh() {
     const name = this.#object?.name;
-    const object = (await this.#objects()).find((other) => other.name === name && !other.held);
+    const object = (await readObjects()).find((other) => other.name === name && !other.held);
     if (this.#object?.name !== name) return;
     if (!object) return this.#show(null);
     this.#object = object;

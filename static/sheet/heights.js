@@ -1,6 +1,6 @@
-// The heights of the sheet on a phone: its handle is dragged, tapped, or moved by the arrow keys. Sideways
-// the handle and the row of tabs change the tab. Loaded by sheet.js into viser's page.
-import { PANEL, PANEL_HANDLE, TAB, TABS } from "../viser/names.js";
+// The heights of the sheet on a phone: its handle is dragged, tapped, or moved by the arrow keys. Loaded by sheet.js into
+// viser's page.
+import { PANEL, PANEL_HANDLE } from "../viser/names.js";
 
 // Name and height of each; the scene leaves at most half of the page. Above the sheet at full height
 // there is room for the buttons and messages that the surrounding page lays over the scene.
@@ -9,11 +9,8 @@ const [HALF, ABOVE] = [0.5, 120]; // fraction of the page, and px, as above
 const TAP = 6; // px, movement up to which a touch is a tap
 const COAST = 120; // ms for which the finger's speed counts as if it moved on
 const QUICK = 150; // ms
-const SWIPE = 40; // px sideways that change the tab
 /** @type {Record<string, number>} */
 const STEPS = { ArrowUp: 1, ArrowDown: -1 };
-/** @type {Record<string, number>} */
-const ASIDE = { ArrowRight: 1, ArrowLeft: -1 };
 
 const outer = window.parent === window ? null : window.parent;
 const { style, dataset } = document.documentElement;
@@ -34,7 +31,6 @@ look.replaceSync(`
     content: ""; position: absolute; top: 0.5em; left: 50%; width: 2.8em; height: 0.3em; margin-left: -1.4em; border-radius: 0.2em;
     background: currentcolor; opacity: 0.35;
   }
-  ${TABS} { touch-action: pan-y; }
   #k450-sheet:focus-visible { outline: 3px solid #4b96ea; outline-offset: -3px; }
 `);
 document.adoptedStyleSheets.push(look);
@@ -42,8 +38,6 @@ document.adoptedStyleSheets.push(look);
 let height = 0; // index of the present one
 /** @type {{ id: number, y: number, from: number, at: number, speed: number, tall: number } | null} */
 let drag = null; // of the finger that moves the handle
-/** @type {{ id: number, x: number, y: number, aside: boolean | null } | null} */
-let swipe = null; // {id, x, y, aside} of the finger on the handle or the tabs
 let dragged = false; // whether the last touch was more than a tap
 
 /** @param {string} sheet @param {string} room */
@@ -83,33 +77,6 @@ function raise(next) {
   choose(next);
 }
 
-/** Choose the tab `by` places further, if the tabs can be seen. @param {number} by */
-function turn(by) {
-  /** @type {NodeListOf<HTMLElement>} */
-  const tabs = document.querySelectorAll(TAB);
-  const at = [...tabs].findIndex((tab) => tab.ariaSelected === "true");
-  if (height) tabs[at + by]?.click();
-}
-
-/** @type {(kind: "pointerdown" | "pointermove" | "pointerup" | "pointercancel", listen: (event: PointerEvent) => void) => void} */
-const onWindow = (kind, listen) => window.addEventListener(kind, listen, { capture: true });
-onWindow("pointerdown", ({ target, pointerId: id, pointerType, clientX: x, clientY: y }) => {
-  const on = target === button || (pointerType === "touch" && target instanceof Element && target.closest(TABS));
-  if (on && !swipe) swipe = { id, x, y, aside: null };
-});
-onWindow("pointermove", ({ pointerId, clientX, clientY }) => {
-  if (pointerId !== swipe?.id) return;
-  const [across, along] = [Math.abs(clientX - swipe.x), Math.abs(clientY - swipe.y)];
-  if (Math.max(across, along) >= TAP) swipe.aside ??= across > along;
-});
-for (const kind of /** @type {const} */ (["pointerup", "pointercancel"]))
-  onWindow(kind, ({ pointerId, clientX, type }) => {
-    if (pointerId !== swipe?.id) return;
-    const [by, { aside }] = [clientX - swipe.x, swipe];
-    swipe = null;
-    if (type === "pointerup" && aside && Math.abs(by) >= SWIPE) turn(-Math.sign(by));
-  });
-
 button.addEventListener("pointerdown", (event) => {
   if (drag || event.button) return;
   button.setPointerCapture(event.pointerId);
@@ -118,12 +85,6 @@ button.addEventListener("pointerdown", (event) => {
 });
 button.addEventListener("pointermove", (event) => {
   if (event.pointerId !== drag?.id) return;
-  if (swipe?.aside) {
-    // It changes no height, and is no tap.
-    drag = null;
-    dragged = true;
-    return;
-  }
   const up = drag.y - event.clientY;
   if (!dragged && Math.abs(up) < TAP) return;
   const tall = Math.max(button.offsetHeight, Math.min(highest(), drag.from + up));
@@ -153,11 +114,10 @@ button.addEventListener("click", (event) => {
   raise((height + 1) % HEIGHTS.length);
 });
 button.addEventListener("keydown", (event) => {
-  if (!(event.key in STEPS || event.key in ASIDE)) return;
+  if (!(event.key in STEPS)) return;
   event.preventDefault();
   event.stopPropagation();
-  if (event.key in ASIDE) turn(ASIDE[event.key]);
-  else raise(height + STEPS[event.key]);
+  raise(height + STEPS[event.key]);
 });
 
 // viser makes another panel whenever the page becomes narrow.

@@ -1,4 +1,4 @@
-// Playing what was taught: all poses or the next one, or the text of a script or its next step.
+// Planning and running what the sheet shows.
 import { messageOf } from "../server.js";
 import { problemsOf } from "./editor.js";
 import { scriptOf } from "./poses.js";
@@ -9,8 +9,10 @@ const PLANNING = "planning";
 /**
  * What the sheet shows meanwhile.
  * @typedef {object} Display
- * @property {(words: string, bad?: boolean) => void} report @property {(busy: boolean) => void} occupy
+ * @property {(words: string, bad?: boolean) => void} report
  * @property {(pose: string | null) => void} mark marks the pose to which the arm moves, by its id
+ * @property {() => { name: string, text: string }} script returns the one that is shown; throws an error without one
+ * @property {(words: string) => void} refuse reports mistakes of the text, which it shows if it is one
  */
 
 export class Player {
@@ -18,20 +20,21 @@ export class Player {
   #content;
   #editor;
   #display;
+  #plan;
   #run;
-  /** @type {string | null} */
-  #next = null; // id of the pose of the next step
 
   // id: of the requests.
   /**
    * @param {Page.Context} page @param {import("./content.js").Content} content
-   * @param {import("./editor.js").Editor} editor @param {Display} display @param {string} id
+   * @param {import("./editor.js").Editor} editor @param {Display} display @param {import("./plan.js").Plan} plan
+   * @param {string} id
    */
-  constructor(page, content, editor, display, id) {
+  constructor(page, content, editor, display, plan, id) {
     this.#page = page;
     this.#content = content;
     this.#editor = editor;
     this.#display = display;
+    this.#plan = plan;
     this.#run = new ScriptRun(page.say, id);
   }
 
@@ -40,85 +43,46 @@ export class Player {
     return this.#run.hear(answer);
   }
 
-  // The index of the pose of the next step.
-  get next() {
-    return Math.max(this.#content.indexOf(this.#next), 0);
-  }
-
-  // Play all, or with `single` the next pose; of a text, its next step.
-  async start(single = false) {
+  // Give the program that is shown the order `run` or `step`; null only plans it, so that the scene shows its path. The
+  // program that the server has is steered.
+  /** @param {"run" | "step" | null} order */
+  async start(order) {
+    const { report, mark } = this.#display;
     const { revocations } = this.#page.store.status ?? {};
-    const isText = this.#content.now.text !== null;
     try {
-      if (this.#run.busy) {
-        if (!single || !isText) throw new Error("It is playing. End it in the bar first.");
-        return await this.#run.step(revocations);
-      }
-      if (isText) await this.#playText(single, revocations);
-      else await this.#playPoses(single, revocations);
+      if (order && this.#plan.isShown && this.#plan.used) return await this.#run.steer(order, revocations);
+      if (this.#run.busy) throw new Error("It is running. End it in the bar first.");
+      await this.#play(order, revocations);
     } catch (error) {
-      this.#display.report(messageOf(error), true);
-    }
-    this.#display.mark(null);
-  }
-
-  /** @param {boolean} single @param {number | undefined} revocations */
-  async #playPoses(single, revocations) {
-    const { now } = this.#content;
-    const all = now.poses;
-    if (!all.length) throw new Error("There is no pose yet. Move the arm and add a pose.");
-    const { next } = this;
-    const first = single ? next : 0;
-    const poses = single ? [{ ...all[next], blend: false }] : all;
-    const { text, poseAt } = scriptOf({ ...now, times: single ? 1 : now.times, poses });
-    /** @param {number} line */
-    const indexAt = (line) => {
-      const pose = poseAt(line);
-      return pose === null ? null : first + pose;
-    };
-    const program = await this.#play(text, "run", revocations, ({ status, line }) => {
-      const index = status === PLANNING || line === null ? null : indexAt(line);
-      if (index !== null) this.#display.mark(all[index].id);
-      return index === null ? "" : `Pose ${index + 1} of ${all.length}`;
-    });
-    if (single && program.status === "done") {
-      this.#next = all[(next + 1) % all.length].id;
-      this.#display.report(`The arm is at pose ${next + 1}.`);
-    }
-    const [worst] = problemsOf(program.why);
-    if (worst) this.#display.report(`Pose ${(indexAt(worst.line) ?? 0) + 1}: ${worst.text}`, true);
-  }
-
-  /** @param {boolean} single @param {number | undefined} revocations */
-  async #playText(single, revocations) {
-    const reading = await this.#editor.check();
-    if (reading?.problems.length) throw new Error("The script is not run: see the lines below.");
-    const { text } = this.#editor;
-    const program = await this.#play(text, single ? "step" : "run", revocations, ({ line, task }) => `Line ${line}: ${task}`);
-    const problems = problemsOf(program.why);
-    if (problems.length) this.#editor.explain(problems);
-  }
-
-  // Play `text` to its end and return its last progress. `where` returns words for a progress.
-  /**
-   * @param {string} text @param {Api.ProgramOrder} order @param {number | undefined} revocations
-   * @param {(program: Api.Progress) => string} where
-   */
-  async #play(text, order, revocations, where) {
-    const { report, occupy } = this.#display;
-    report("Planning …");
-    occupy(true);
-    try {
-      const program = await this.#run.play(text, order, revocations, (progress) => {
-        const words = where(progress);
-        const { status, fraction } = progress;
-        report(status === PLANNING ? `Planning ${Math.round(100 * fraction)} %` : words || "Playing");
-      });
-      const good = program.status === "done";
-      report(good ? "Done." : program.why.split("\n")[0] || "It was ended.", !good);
-      return program;
+      report(messageOf(error), true);
     } finally {
-      occupy(false);
+      mark(null);
     }
+  }
+
+  /** @param {"run" | "step" | null} order @param {number | undefined} revocations */
+  async #play(order, revocations) {
+    const { report, refuse, script, mark } = this.#display;
+    const { now } = this.#content;
+    const isText = now.text !== null;
+    if (isText && (await this.#editor.check())?.problems.length) return refuse("The script is not run: see the lines below.");
+    const { text } = script();
+    /** The index of the pose of a line; null for another line. @param {number} line */
+    const poseAt = (line) => (isText ? null : scriptOf(now).poseAt(line));
+    report("Planning …");
+    const program = await this.#run.play(text, order, revocations, ({ status, fraction, line, task }) => {
+      if (status === PLANNING) return report(`Planning ${Math.round(100 * fraction)} %`);
+      const index = poseAt(line);
+      if (index !== null) mark(now.poses[index].id);
+      report(index === null ? `Line ${line}: ${task}` : `Pose ${index + 1} of ${now.poses.length}`);
+    });
+    const { status, steps, seconds, why } = program;
+    if (status === "ready" && !order) report(`${steps} steps, about ${seconds.toFixed(1)} s.`);
+    else report(status === "done" ? "Done." : why.split("\n")[0] || "It was ended.", status !== "done");
+    const problems = problemsOf(why);
+    if (!problems.length) return;
+    const pose = poseAt(problems[0].line);
+    refuse(pose === null ? problems[0].text : `Pose ${pose + 1}: ${problems[0].text}`);
+    this.#editor.explain(problems);
   }
 }

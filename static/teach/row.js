@@ -80,14 +80,12 @@ export class Row {
     return this.#buttons[name].getAttribute("aria-disabled") === "true";
   }
 
-  // Show the pose `i` of all; `current`: whether the arm moves to it, `next`: whether Step does.
-  /** @param {Pose[]} poses @param {number} i @param {boolean} current @param {boolean} next */
-  show(poses, i, current, next) {
+  /** Show the pose `i` of all; `current`: whether the arm moves to it. @param {Pose[]} poses @param {number} i @param {boolean} current */
+  show(poses, i, current) {
     const pose = (this.#pose = poses[i]);
     const name = `pose ${i + 1}`;
     write(this.#number, String(i + 1));
-    set(this.element, "aria-label", `${name[0].toUpperCase()}${name.slice(1)}${next ? ", next for Step" : ""}`);
-    this.element.classList.toggle("next", next);
+    set(this.element, "aria-label", `${name[0].toUpperCase()}${name.slice(1)}`);
     if (current) set(this.element, "aria-current", "step");
     else this.element.removeAttribute("aria-current");
     if (this.#picture.getAttribute("src") !== pose.picture) {

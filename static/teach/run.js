@@ -38,12 +38,12 @@ export class ScriptRun {
     return true;
   }
 
-  // Send `text` and give the order `run` or `step`. Return the last progress of the program.
+  // Send `text` and give the order `run` or `step`; null only plans it. Return the last progress of the program.
   // Throws an error with the reason for a refusal. `shows` gets each progress.
   // revocations: of the status at the press; after a stop the requests are refused.
   /**
-   * @param {string} text @param {Api.ProgramOrder} order @param {number | undefined} revocations
-   * @param {(program: Api.Progress) => void} shows
+   * @param {string} text @param {Api.ProgramOrder | null} order @param {number | undefined} revocations
+   * @param {(program: Api.Progress) => void} [shows]
    */
   async play(text, order, revocations, shows) {
     this.busy = true;
@@ -51,22 +51,22 @@ export class ScriptRun {
       const fields = { revocations, id: this.#id };
       await this.#ask(parts(text, fields));
       try {
-        await this.#ask([{ do: "steer", order, ...fields }]);
+        if (order) await this.#ask([{ do: "steer", order, ...fields }]);
       } catch (error) {
         // The planning may have failed already, and has the reason.
         const program = (await readState())?.program;
         if (program?.status === "refused") return program;
         throw error;
       }
-      return await this.follow(shows);
+      return await this.follow(shows, order === null);
     } finally {
       [this.busy, this.#waiting] = [false, []];
     }
   }
 
-  /** Continue a program that is paused after a step. @param {number | undefined} revocations */
-  step(revocations) {
-    return this.#ask([{ do: "steer", order: "step", revocations, id: this.#id }]);
+  /** Steer the program that the server has. @param {Api.ProgramOrder} order @param {number | undefined} revocations */
+  steer(order, revocations) {
+    return this.#ask([{ do: "steer", order, revocations, id: this.#id }]);
   }
 
   /** @param {Api.Act[]} requests */
@@ -81,15 +81,15 @@ export class ScriptRun {
   }
 
   // Return the last progress of the program that runs. One that a stop or another command has kept from running stays
-  // planned, with a reason.
-  /** @param {(program: Api.Progress) => void} shows */
-  async follow(shows) {
+  // planned, with a reason; `planned`: one that is not to run, too.
+  /** @param {(program: Api.Progress) => void} [shows] */
+  async follow(shows, planned = false) {
     this.busy = true;
     for (; ; await pause(EVERY)) {
       const program = (await readState())?.program;
       if (!program) continue;
-      shows(program);
-      const kept = program.why.startsWith("Not run");
+      shows?.(program);
+      const kept = planned || program.why.startsWith("Not run");
       if (!ENDS.includes(program.status) && !(kept && program.status === "ready")) continue;
       this.busy = false;
       return program;

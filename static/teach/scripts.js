@@ -1,81 +1,91 @@
 // Scripts in files: those of the server's folder, and those of the person.
-import { save } from "../dom.js";
+import { save, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { messageOf, request } from "../server.js";
 
 const FILE = ".yaml";
+const NEW = ".new"; // value of the option; no script has such a name
 
 /**
  * What the sheet does with a script.
  * @typedef {object} Sheet
  * @property {() => { name: string, text: string }} script returns the one that is shown; throws an error without one
- * @property {(text: string, name: string, asText: boolean) => Promise<void>} load
+ * @property {(text: string, name: string) => Promise<void>} load @property {() => void} begin shows an empty list of poses
  * @property {(words: string, bad?: boolean) => void} report
  */
 
 export class Scripts {
   #sheet;
-  #open = html("select", { "aria-label": "Open a script" });
+  open = html("select", { "aria-label": "Program" });
+  #shown = new Option("", "");
   #file = html("input", { type: "file", accept: ".yaml,.yml", "aria-label": "File of a script", hidden: "" });
   #keep = button("Save", () => this.#save(), { hidden: "", title: "Save in the folder of the server" });
-  controls = [button("Download", () => this.#download()), this.#keep, this.#open, this.#file];
+  controls = [button("Download", () => this.#download()), this.#keep, this.#file];
 
   /** @param {Sheet} sheet */
   constructor(sheet) {
     this.#sheet = sheet;
-    this.#open.addEventListener("change", () => this.#choose());
+    this.open.addEventListener("change", () => this.#choose());
     this.#file.addEventListener("change", () => this.#take());
   }
 
   // List the scripts of the server.
   async list() {
-    const answer = await fetch("api/v1/scripts").catch(() => null);
-    if (!answer?.ok) return;
+    const answer = await request("api/v1/scripts").catch(() => null);
+    if (!answer) return;
     /** @type {{ names: string[], saves: boolean }} */
     const { names, saves } = await answer.json();
     this.#keep.hidden = !saves;
-    this.#open.replaceChildren(new Option("Open …", ""), new Option("A file …", FILE), ...names.map((name) => new Option(name)));
+    this.open.replaceChildren(this.#shown, new Option("New poses", NEW), new Option("A file …", FILE), ...names.map((name) => new Option(name)));
+    this.open.value = "";
   }
 
-  // Show the script of this name, of the library or of the folder of the server: as text, or as poses if it has only these.
-  /** @param {string} name @param {boolean} asText */
-  async open(name, asText) {
-    const answer = await fetch(`api/v1/scripts/${encodeURIComponent(name)}`).catch(() => null);
-    if (answer?.ok) await this.#sheet.load(await answer.text(), name, asText);
-    else this.#sheet.report(answer ? await answer.text() : "There is no connection to the arm.", true);
+  /** Show the name of the program that the sheet shows. @param {string} name */
+  show(name) {
+    write(this.#shown, name);
   }
 
+  // Show the script that was chosen, of the library or of the folder of the server.
   async #choose() {
-    const name = this.#open.value;
-    this.#open.value = "";
-    if (name === FILE) this.#file.click();
-    else if (name) await this.open(name, false);
+    const name = this.open.value;
+    this.open.value = "";
+    if (name === FILE) return this.#file.click();
+    if (name === NEW) return this.#sheet.begin();
+    try {
+      await this.#sheet.load(await (await request(`api/v1/scripts/${encodeURIComponent(name)}`)).text(), name);
+    } catch (error) {
+      this.#sheet.report(messageOf(error), true);
+    }
   }
 
   async #take() {
     const file = this.#file.files?.[0];
     this.#file.value = "";
-    if (file) await this.#sheet.load(await file.text(), file.name.replace(/\.ya?ml$/i, ""), false);
+    if (file) await this.#sheet.load(await file.text(), file.name.replace(/\.ya?ml$/i, ""));
+  }
+
+  /** Use the script that is shown, and report what this returns or why it fails. @param {(name: string, text: string) => string | Promise<string>} use */
+  async #use(use) {
+    try {
+      const { name, text } = this.#sheet.script();
+      this.#sheet.report(await use(name, text));
+    } catch (error) {
+      this.#sheet.report(messageOf(error), true);
+    }
   }
 
   #download() {
-    try {
-      const { name, text } = this.#sheet.script();
+    return this.#use((name, text) => {
       save(new Blob([text], { type: "application/yaml" }), `${name}${FILE}`);
-      this.#sheet.report(`Saved as ${name}${FILE}.`);
-    } catch (error) {
-      this.#sheet.report(messageOf(error), true);
-    }
+      return `Saved as ${name}${FILE}.`;
+    });
   }
 
-  async #save() {
-    try {
-      const { name, text } = this.#sheet.script();
+  #save() {
+    return this.#use(async (name, text) => {
       await request(`api/v1/scripts/${encodeURIComponent(name)}`, { method: "POST", body: text });
-      this.#sheet.report(`Saved as ${name}. It is under Script in the tab Programs.`);
       await this.list();
-    } catch (error) {
-      this.#sheet.report(messageOf(error), true);
-    }
+      return `Saved as ${name}. It is in the list of programs.`;
+    });
   }
 }

@@ -1,11 +1,13 @@
-// The Teach sheet: poses of the arm that are recorded, ordered, played and saved as a script.
-import { first, matches, sceneOf, styled, write } from "../dom.js";
+// The sheet of programs: one program at a time, as poses that are recorded and ordered, as its steps, or as text. It is
+// previewed, run and saved.
+import { element, first, matches, sceneOf, styled, write } from "../dom.js";
 import { button, html, set } from "../instruments/shape.js";
 import { messageOf, readArm, readState } from "../server.js";
 import { thumbnail } from "../viser/pictures.js";
 import { Content } from "./content.js";
 import { Editor } from "./editor.js";
 import { draggable } from "./order.js";
+import { Plan } from "./plan.js";
 import { Player } from "./player.js";
 import { MAX_POSES, MAX_TIMES, fingersOf, isPicture, poseOf, read, scriptOf } from "./poses.js";
 import { Row } from "./row.js";
@@ -18,6 +20,10 @@ const FILLED = 1.35; // size of a picture, relative to the arm in it
 const AROUND = [[0, 0, 0], [0, 0, 0.5], "/target/move"]; // places round the arm
 const RADIANS = Math.PI / 180;
 const EMPTY = "There is no pose yet. Move the arm and add a pose.";
+const TEACH = "Move the arm, then press Add pose. Each pose keeps the joints and the gripper. Or choose a program above.";
+const UNPLANNED = "Preview plans the program, shows its path in the scene and lists its steps here. Run also plans it first.";
+/** @typedef {"poses" | "steps" | "text"} View */
+const VIEWS = /** @type {const} */ ({ poses: "Poses", steps: "Steps", text: "Text" });
 
 export class Teach {
   #page;
@@ -28,24 +34,36 @@ export class Teach {
   #player;
   #scripts = new Scripts({
     script: () => this.#script(),
-    load: (text, name, asText) => this.#load(text, name, asText),
+    load: (text, name) => this.#load(text, name),
+    begin: () => {
+      this.#view = "poses";
+      this.#content.change({ name: "My script", times: 1, poses: [], text: null });
+    },
     report: (words, bad) => this.#report(words, bad),
   });
   #editor = new Editor((text) => this.#content.keepText(text));
   /** @type {string | null} */
   #current = null; // id of the pose to which the arm moves
-  #sheet = html("section", { id: "teach", class: "sheet", "aria-label": "Teach: record poses and play them", hidden: "" });
+  #sheet = html("section", { id: "teach", class: "sheet", "aria-label": "Programs: record, preview and run", hidden: "" });
   #list = html("ol", { "aria-label": "Poses" });
-  #empty = html("p", { class: "empty" }, "Move the arm, then press Add pose. Each pose keeps the joints and the gripper.");
+  #empty = html("p", { class: "empty" });
   #says = html("p", { id: "teach-says", role: "status" });
-  #add = button("Add pose", () => this.#record(), { class: "main" });
-  #play = button("Play", () => this.#player.start(), { id: "teach-play" });
-  #step = button("Step", () => this.#player.start(true), { id: "teach-step" });
-  #undo = button("↶", () => this.#content.undo(), { "aria-label": "Undo in Teach", title: "Undo in Teach" });
-  #redo = button("↷", () => this.#content.redo(), { "aria-label": "Redo in Teach", title: "Redo in Teach" });
+  #add = button("Add pose", () => this.#record(), { class: "add" });
+  #play = button("Run", () => this.#player.start("run"), { id: "teach-play", class: "main" });
+  #step = button("Step", () => this.#player.start("step"), { id: "teach-step" });
+  #undo = button("↶", () => this.#content.undo(), { "aria-label": "Undo in Programs", title: "Undo in Programs" });
+  #redo = button("↷", () => this.#content.redo(), { "aria-label": "Redo in Programs", title: "Redo in Programs" });
   #times = html("input", { type: "number", min: "1", max: MAX_TIMES, step: "1", inputmode: "numeric" });
   #name = html("input", { maxlength: "40", spellcheck: "false", autocomplete: "off" });
-  #text = button("Edit as text", () => this.#toggleText(), { "aria-pressed": "false" });
+  #views = {
+    poses: button(VIEWS.poses, () => this.#view === "poses" || this.#toPoses()),
+    steps: button(VIEWS.steps, () => this.#see("steps")),
+    text: button(VIEWS.text, () => this.#view === "text" || this.#toText()),
+  };
+  /** @type {View} */
+  #view = "poses";
+  #plan;
+  #other = html("p", { id: "teach-other", hidden: "" });
 
   /** Return the sheet once it is styled and the arm is known. @param {Page.Context} page */
   static async in(page) {
@@ -60,26 +78,34 @@ export class Teach {
     this.#page = page;
     this.#arm = arm;
     this.#content = new Content(page.kept, arm, () => this.#draw());
+    this.#plan = new Plan(page.say, () => this.#shownText, () => this.#drawPlan());
     const display = {
       report: (/** @type {string} */ words, bad = false) => this.#report(words, bad),
-      occupy: (/** @type {boolean} */ busy) => set(this.#play, "aria-disabled", busy),
       mark: (/** @type {string | null} */ pose) => this.#mark(pose),
+      script: () => this.#script(),
+      refuse: (/** @type {string} */ words) => {
+        if (this.#content.now.text !== null) this.#see("text");
+        this.#report(words, true);
+      },
     };
-    this.#player = new Player(page, this.#content, this.#editor, display, ID);
-    const actions = html("div", { class: "bar" }, this.#add, this.#play, this.#step, this.#undo, this.#redo);
+    this.#player = new Player(page, this.#content, this.#editor, display, this.#plan, ID);
+    const preview = button("Preview", () => this.#player.start(null), { title: "Plan it, and show the path of the tool" });
+    const actions = html("div", { class: "bar" }, this.#play, this.#step, preview, this.#undo, this.#redo);
+    const views = html("div", { class: "bar views", role: "group", "aria-label": "Show as" }, ...Object.values(this.#views), this.#add);
     const loop = html("label", {}, "Loop", this.#times, "times");
     const named = html("label", { class: "wide" }, "Name", this.#name);
-    const files = html("div", { class: "bar" }, ...this.#scripts.controls, this.#text);
+    const files = html("div", { class: "bar" }, ...this.#scripts.controls);
     const rest = html("div", { class: "rest" }, html("div", { class: "bar" }, named, loop), files);
-    this.#sheet.append(actions, this.#says, html("div", { class: "scrolled" }, this.#empty, this.#list, this.#editor.element), rest);
-    first("#toast", HTMLElement, page.stage).before(this.#sheet);
+    const scrolled = html("div", { class: "scrolled" }, this.#empty, this.#list, this.#plan.list, this.#editor.element);
+    this.#sheet.append(this.#scripts.open, actions, this.#says, this.#other, this.#plan.look, views, scrolled, rest);
+    element("dock", HTMLElement).prepend(this.#sheet);
     this.#times.addEventListener("change", () => {
       const times = Math.min(Math.max(Math.round(this.#times.valueAsNumber) || 1, 1), MAX_TIMES);
       this.#content.change({ times });
     });
     this.#name.addEventListener("change", () => this.#content.change({ name: this.#name.value.trim() || "My script" }));
     this.#sheet.addEventListener("keydown", (event) => this.#key(event));
-    if (this.#content.now.text !== null) this.#editor.text = this.#content.now.text;
+    if (this.#content.now.text !== null) [this.#editor.text, this.#view] = [this.#content.now.text, "steps"];
     this.#draw();
     if (this.#content.broken) this.#report("What this browser had kept cannot be read, so the list is empty.");
   }
@@ -88,11 +114,7 @@ export class Teach {
   show(shown) {
     this.#sheet.hidden = !shown;
     if (shown) this.#scripts.list();
-  }
-
-  /** Show the script of this name of the server, with `asText` as text. @param {string} name @param {boolean} asText */
-  open(name, asText) {
-    return this.#scripts.open(name, asText);
+    this.#plan.watch(shown);
   }
 
   /** Take an answer; return whether it was for the sheet. @param {Page.Answer} answer */
@@ -225,18 +247,23 @@ export class Teach {
 
   // Texts
 
-  async #toggleText() {
+  #toText() {
     if (this.#content.now.text === null) {
       this.#editor.text = scriptOf(this.#content.now).text;
       this.#content.change({ text: this.#editor.text });
       this.#report("Space types a blank in the text; Esc stops the arm.");
-      return this.#editor.focus();
     }
+    this.#see("text");
+    this.#editor.focus();
+  }
+
+  async #toPoses() {
+    if (this.#content.now.text === null) return this.#see("poses");
     const reading = await this.#editor.check();
     if (!reading) return this.#report("There is no connection to the arm.", true);
     if (reading.taught) return this.#takeTaught(reading.taught);
-    const why = reading.problems.length ? "The text has errors: see the lines below." : "It has steps that are no poses, so it stays text.";
-    this.#report(why, true);
+    if (reading.problems.length) this.#see("text");
+    this.#report(reading.problems.length ? "The text has errors: see the lines below." : "It has steps that are no poses.", true);
   }
 
   /** @param {import("./poses.js").Taught} taught */
@@ -248,6 +275,7 @@ export class Teach {
       const old = known.get(pose.joints.join());
       return old ? { ...pose, picture: old.picture, gripper: pose.gripper ?? old.gripper } : pose;
     });
+    this.#view = "poses";
     this.#content.change({ name, times: Math.min(times, MAX_TIMES), poses: taken, text: null });
     this.#report(poses.length > MAX_POSES ? `Only the first ${MAX_POSES} poses are shown.` : "");
   }
@@ -260,21 +288,51 @@ export class Teach {
     return { name: now.name, text: scriptOf(now).text };
   }
 
-  // Show a script as poses if it has only these, otherwise and with `asText` as text.
-  /** @param {string} text @param {string} name @param {boolean} asText */
-  async #load(text, name, asText) {
+  // The text of what the sheet shows; null without one.
+  get #shownText() {
+    const { now } = this.#content;
+    if (now.text !== null) return this.#editor.text;
+    return now.poses.length ? scriptOf(now).text : null;
+  }
+
+  // Show a script: as poses if it has only these, otherwise its steps, or its text if this has errors.
+  /** @param {string} text @param {string} name */
+  async #load(text, name) {
     this.#editor.text = text;
+    this.#view = "steps";
     this.#content.change({ text, name: name.slice(0, 40) });
     const reading = await this.#editor.check();
-    if (reading?.taught && !asText) this.#takeTaught(reading.taught);
-    else if (reading?.problems.length) this.#report("The text has errors: see the lines below.");
-    else this.#report(asText ? `${name} is shown as text.` : "It has steps that are no poses, so it is shown as text.");
+    if (reading?.taught) return this.#takeTaught({ ...reading.taught, name: this.#content.now.name });
+    if (reading?.problems.length) this.#see("text");
+    this.#report(reading?.problems.length ? "The text has errors: see the lines below." : `${name} is opened.`);
   }
 
   // Display
 
+  /** @param {View} view */
+  #see(view) {
+    this.#view = view;
+    this.#draw();
+  }
+
+  // Show the steps of the program of the server, or that it has another one.
+  #drawPlan() {
+    const isSteps = this.#view === "steps";
+    this.#empty.hidden = isSteps ? this.#plan.list.childElementCount > 0 : this.#view === "text" || this.#poses.length > 0;
+    write(this.#empty, isSteps ? UNPLANNED : TEACH);
+    const { isShown, used, answer } = this.#plan;
+    const isOther = used !== null && !isShown;
+    if (isOther && this.#other.hidden) {
+      const words = `${used.by} ${used.status === "planning" ? "plans" : "runs"} ${used.name || "a script"}. `;
+      this.#other.replaceChildren(words, button("Show it", () => this.#load(answer.text ?? "", used.name)));
+    }
+    this.#other.hidden = !isOther;
+  }
+
   #draw() {
     const { name, times, poses, text } = this.#content.now;
+    // Undo and redo change which views there are.
+    if (this.#view === (text === null ? "text" : "poses")) this.#view = text === null ? "poses" : "text";
     const focused = document.activeElement;
     this.#drawRows(poses);
     // A row that was moved in the document has lost the focus.
@@ -282,13 +340,17 @@ export class Teach {
     if (text !== null && text !== this.#editor.text) this.#editor.text = text;
     const isText = text !== null;
     this.#sheet.classList.toggle("text", isText);
-    this.#list.hidden = isText;
-    this.#empty.hidden = isText || poses.length > 0;
-    this.#editor.element.hidden = !isText;
-    this.#add.hidden = isText;
+    this.#list.hidden = this.#view !== "poses";
+    this.#plan.list.hidden = this.#view !== "steps";
+    this.#editor.element.hidden = this.#view !== "text";
+    this.#add.hidden = this.#view !== "poses";
+    // A pose may be several steps, and Go moves to one of them.
+    this.#step.hidden = this.#view === "poses";
+    this.#scripts.show(name);
+    this.#plan.draw();
+    this.#drawPlan();
     this.#times.disabled = isText;
-    set(this.#text, "aria-pressed", isText);
-    write(this.#text, isText ? "Edit as poses" : "Edit as text");
+    for (const [view, control] of Object.entries(this.#views)) set(control, "aria-pressed", view === this.#view);
     if (this.#times !== focused || this.#times.valueAsNumber !== times) this.#times.value = String(times);
     if (this.#name !== focused || this.#name.value.trim() !== name) this.#name.value = name;
     set(this.#undo, "aria-disabled", !this.#content.undoable);
@@ -302,11 +364,10 @@ export class Teach {
         row.element.remove();
         this.#rows.delete(id);
       }
-    const next = this.#player?.next ?? 0;
     poses.forEach((pose, i) => {
       const row = this.#rows.get(pose.id) ?? this.#rowOf(pose);
       this.#rows.set(pose.id, row);
-      row.show(poses, i, pose.id === this.#current, i === next && poses.length > 1);
+      row.show(poses, i, pose.id === this.#current);
       if (this.#list.children[i] !== row.element) this.#list.insertBefore(row.element, this.#list.children[i] ?? null);
     });
   }

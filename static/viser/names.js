@@ -9,9 +9,6 @@ export const PANEL = '.mantine-Paper-root[style*="position: fixed"]';
 export const PANEL_HANDLE = `${PANEL} [style*="height: 3.5em"]`;
 export const PANEL_CONTENT = `${PANEL} [style*="width: 20em"]`;
 export const PANEL_GROUND = "var(--mantine-color-body)";
-// The tabs of the panel, and their row.
-export const TAB = "[role=tab]";
-export const TABS = "[role=tablist]";
 // The hint of a control, which lies over other ones.
 export const HINT = "[role=tooltip]";
 // Its notice that it draws by software, which would cover the scene. The banner says so where that makes the picture old.

@@ -19,7 +19,6 @@ export class Welcome {
   #page;
   #card = html("section", { id: "welcome", class: "sheet", "aria-label": "First steps" });
   #says = html("p", { role: "status" });
-  #bar = html("progress", { max: "1", "aria-label": "Progress of the program", hidden: "" });
   #pulse = html("i", { id: "pulse", hidden: "" });
   #arm;
   /** @type {number | null} */
@@ -48,10 +47,10 @@ export class Welcome {
     const close = button("×", () => this.#dismiss(), { "aria-label": "Close for good" });
     const list = html("ol", {});
     if (arm.default_tool) list.append(this.#step("drag", "Drag the arrows", "Move the tool by its coloured handle", () => this.#drag()));
-    else list.append(this.#step("drag", "Turn a joint", "Drag a link of the arm, or a slider of the panel", () => this.#turn()));
+    else list.append(this.#step("drag", "Turn a joint", "Drag a link of the arm, or a slider of the panel", () => write(this.#says, "Drag a link of the arm in the scene, or a slider in the panel.")));
     if (this.#program) list.append(this.#step(this.#program.name, this.#program.title, this.#program.about, () => this.#play()));
     list.append(this.#step("part", "Bring your own part", "Choose a file, or drop it on the scene", () => this.#part()));
-    this.#card.append(html("h2", {}, "First steps"), close, list, this.#says, this.#bar);
+    this.#card.append(html("h2", {}, "First steps"), close, list, this.#says);
     element("toast", HTMLElement).before(this.#card, this.#pulse);
     page.store.follow((news) => this.#note(news));
     window.addEventListener("placed", () => this.#done("part"));
@@ -103,10 +102,6 @@ export class Welcome {
     this.#place();
   }
 
-  #turn() {
-    write(this.#says, "Drag a link of the arm in the scene, or a slider in the panel.");
-  }
-
   // Put the ring where the camera shows the handle.
   #place() {
     const { scene } = this.#page;
@@ -142,22 +137,16 @@ export class Welcome {
     if (this.#run.busy || !this.#program) return;
     this.#still();
     write(this.#says, "");
-    /** @param {Api.Progress} program */
-    const show = ({ status, fraction, step, steps }) => {
-      this.#bar.hidden = false;
-      this.#bar.value = status === "planning" ? fraction : step / Math.max(steps, 1);
-    };
     const { name, did, not } = this.#program;
     try {
       const { revocations } = this.#page.store.status ?? {};
-      const program = began ? await this.#run.follow(show) : await this.#run.play(await this.#script(), "run", revocations, show);
+      const program = began ? await this.#run.follow() : await this.#run.play(await this.#script(), "run", revocations);
       const worked = program.status === "done";
       if (worked) this.#done(name);
       write(this.#says, worked ? did : `${not} ${program.why || program.status}`);
     } catch (error) {
       write(this.#says, `${not} ${messageOf(error)}`);
     }
-    this.#bar.hidden = true;
   }
 
   // Return the text of the program.

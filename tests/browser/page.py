@@ -104,7 +104,7 @@ class ViserPage:
         self.page.context.close()
 
     def reset(self) -> None:
-        """Close all sheets and show the first tab, from the first camera and in the first size."""
+        """Close all sheets, and show the first camera in the first size."""
         self.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1]})
         self.page.emulate_media(color_scheme="light")
         self.page.evaluate(
@@ -114,7 +114,6 @@ class ViserPage:
             }"""
         )
         self.frame.evaluate("() => document.activeElement?.blur()")
-        self.frame.get_by_role("tab").first.click()
         self.look_from(Camera())
 
     # Waiting
@@ -288,14 +287,6 @@ class ViserPage:
             grip.sweep(radians, steps)
 
     # The panel
-
-    def tabs(self) -> list[str]:
-        """Return the labels of the panel's tabs."""
-        return self.frame.get_by_role("tab").all_inner_texts()
-
-    def open_tab(self, label: str) -> None:
-        """Open a tab of the panel; its controls can be used afterwards."""
-        self.frame.get_by_role("tab", name=label, exact=True).click()
 
     def _label(self, label: str) -> Locator:
         named = self.frame.locator("label").filter(has_text=re.compile(f"^{re.escape(label)}$"))

@@ -48,7 +48,7 @@ class Person:
             hand.move(end)
             hand.lift()
 
-    def open_panel(self, tab: str) -> None:
+    def open_panel(self) -> None:
         sheet = self.page.frame.locator("#k450-sheet")
         while self.touches and sheet.is_visible():
             if sheet.get_attribute("aria-label") == "Controls, full height":
@@ -57,7 +57,6 @@ class Person:
             self.rest(sheet)
         if self.touches and sheet.is_visible():
             self.assert_above(self.page.page.get_by_role("group", name="Camera"), sheet)
-        self.press(self.page.frame.get_by_role("tab", name=tab, exact=True))
 
     def pause(self, status: Callable[[], Any]) -> None:
         """Pause by the bar."""

@@ -1,4 +1,4 @@
-"""The Teach sheet as a person uses it: poses are taught, dragged and played."""
+"""The sheet of programs as a person uses it: poses are taught, dragged and played."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ def teach(page: ViserPage, truth: Truth, values: tuple[float, ...] = TURNS) -> N
 
 
 def play(page: ViserPage, truth: Truth) -> list[tuple[float, int | None]]:
-    """Press Play; return axis 1 [deg] and the number of the marked pose, until the end."""
-    press(page, "Play")
+    """Press Run; return axis 1 [deg] and the number of the marked pose, until the end."""
+    press(page, "Run")
     angles: list[tuple[float, int | None]] = []
     deadline = time.monotonic() + PLAYED
     while says(page) != "Done.":

@@ -41,7 +41,6 @@ def page(page: ViserPage) -> Iterator[ViserPage]:
     folder.click()
     row(page, "front-down").scroll_into_view_if_needed()
     yield page
-    page.open_tab("Drive")
     folder.click()
 
 

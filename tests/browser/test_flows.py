@@ -68,7 +68,7 @@ def motion(person: Person) -> None:
     page, truth = person.page, person.truth
     page.page.locator("#speed input").fill("10")
     truth.wait(speed=0.1)
-    person.open_panel("Drive")
+    person.open_panel()
     person.keep("drive")
     person.press(page.frame.get_by_role("button", name="Home", exact=True))
     person.fold_panel()
@@ -103,7 +103,7 @@ def steps_and_gripper(person: Person) -> None:
 
 def numbers(person: Person) -> None:
     page, truth = person.page, person.truth
-    person.open_panel("Drive")
+    person.open_panel()
     box = page.number_box(AXES[0])
     box.fill("500")
     page.wait_until(lambda: box.get_attribute("aria-invalid") == "true", "the mark")
@@ -116,24 +116,25 @@ def numbers(person: Person) -> None:
 
 def program(person: Person) -> None:
     page, truth = person.page, person.truth
-    person.open_panel("Programs")
-    page.choose("Script", "Circle with gripper")
-    person.press(page.frame.get_by_role("button", name="Preview", exact=True))
+    person.press(page.page.locator("#teach-button"))
+    page.page.locator("#teach > select").select_option("Circle with gripper")
+    person.button("Preview", inside="#teach")
 
     def status() -> Any:
         return truth.status().get("program", {}).get("status")
 
     page.wait_until(lambda: status() == "ready", "the plan", seconds=PLANNED)
+    page.page.locator("#teach .steps li").first.wait_for()
     person.keep("previewed")
-    person.press(page.frame.get_by_role("button", name="Run", exact=True))
+    person.button("Run", inside="#teach")
     page.wait_until(lambda: status() == "running", "the run")
-    person.fold_panel()
     page.wait_until(lambda: "Step" in bar(page, "mode") or "step" in bar(page, "mode"), "the step")
     person.keep("program")
     person.pause(status)
     resume(page)
     page.wait_until(lambda: status() == "running", "the program to continue")
     person.stop()
+    person.press(page.page.locator("#teach-button"))
 
 
 def objects(person: Person, reader: Client, folder: Path) -> None:
@@ -150,6 +151,9 @@ def objects(person: Person, reader: Client, folder: Path) -> None:
         person.press(page.page.locator("#add"))
     chooser.value.set_files(part)
     page.wait_until(lambda: len(names()) == len(before) + 1, "the object")
+    # The new object is the chosen one.
+    form = page.page.locator("#object")
+    page.wait_until(lambda: form.get_by_label("Object").input_value() not in before, "the choice")
     person.keep("objects")
     person.assert_stop_is_free()
     person.press(page.page.locator("#objects-button"))
@@ -180,11 +184,12 @@ def teaching(person: Person) -> None:
     page = person.page
     person.press(page.page.locator("#teach-button"))
     page.page.wait_for_selector("#teach:not([hidden])")
+    page.page.locator("#teach > select").select_option("New poses")
     rows = page.page.locator("#teach li[data-id]")
     person.button("Add pose", inside="#teach")
     page.wait_until(lambda: rows.count() == 1, "the pose")
     person.keep("teach")
-    person.button("Undo in Teach", inside="#teach")
+    person.button("Undo in Programs", inside="#teach")
     page.wait_until(lambda: rows.count() == 0, "the pose to go")
     person.assert_stop_is_free()
     person.press(page.page.locator("#teach-button"))
@@ -239,7 +244,6 @@ def pour(person: Person) -> None:
     person.press(page.page.locator("#welcome button", has_text="Watch it pour"))
     says = page.page.locator("#welcome [role=status]")
     page.wait_until(lambda: bar(page, "headline").startswith("Pour:"), "the run", seconds=PLANNED)
-    assert page.page.get_by_role("progressbar", name="Progress of the program").is_visible()
     person.truth.wait(20.0, moving=True)
     person.keep("pour")
     person.stop()
@@ -249,23 +253,24 @@ def pour(person: Person) -> None:
 
 def planning(person: Person) -> None:
     page, truth = person.page, person.truth
-    person.open_panel("Programs")
-    page.choose("Script", LONG)
-    person.press(page.frame.get_by_role("button", name="Preview", exact=True))
+    person.press(page.page.locator("#teach-button"))
+    page.page.locator("#teach > select").select_option(LONG)
+    person.button("Preview", inside="#teach")
     page.wait_until(lambda: bar(page, "headline").startswith("Planning"), "the planning")
     person.button("Cancel", inside="#orders")
     page.wait_until(lambda: "Planning" not in bar(page, "headline"), "the end", seconds=20.0)
     person.assert_stop_is_free()
     person.keep("planning-cancelled")
     assert truth.status()["moving"] is False
-    person.fold_panel()
+    page.page.locator("#teach > select").select_option("New poses")
+    person.press(page.page.locator("#teach-button"))
 
 
 def taught_poses(person: Person) -> None:
     page, truth = person.page, person.truth
     rows = page.page.locator("#teach li[data-id]")
     for number, angle in enumerate((25.0, -15.0), 1):
-        person.open_panel("Drive")
+        person.open_panel()
         box = page.number_box(AXES[0])
         box.fill(str(angle))
         box.press("Enter")
@@ -280,7 +285,7 @@ def taught_poses(person: Person) -> None:
         if number == 1:
             person.press(page.page.locator("#teach-button"))
     person.keep("taught")
-    person.button("Play", inside="#teach")
+    person.button("Run", inside="#teach")
     says = page.page.locator("#teach-says")
     page.wait_until(lambda: truth.status()["q"][0] > np.radians(20.0), "pose 1", seconds=PLANNED)
     page.wait_until(lambda: says.inner_text() == "Done.", "the end", seconds=PLANNED)
@@ -314,7 +319,7 @@ def link(person: Person, reader: Client) -> None:
 
 def branch(person: Person) -> None:
     page, truth = person.page, person.truth
-    person.open_panel("Drive")
+    person.open_panel()
     person.press(page.frame.get_by_role("button", name="Home", exact=True))
     truth.wait(10.0, moving=False)
     person.press(page.frame.get_by_text("Branches", exact=True))

@@ -156,10 +156,14 @@ def test_chosen_file_is_refused_or_placed_changed_and_removed(
 
     # Its handle in the scene, by a click on it.
     handle = "/handles/ring"
-    page.open_tab("Scene")
+    form = page.page.locator("#object")
+    choice = form.get_by_label("Object")
+    page.wait_until(lambda: choice.input_value() == "ring", "the new object to be chosen")
+    choice.select_option("cup")
     page.page.mouse.click(*page.project(np.add(place_of(reader, "ring"), (0.0, 0.04, 0.024))))
     page.wait_ready((handle,))
-    assert page.chosen("Object") == "ring"
+    # The form shows what is selected in the scene.
+    page.wait_until(lambda: choice.input_value() == "ring", "the selected object")
     page.drag_arrow(handle, "y", 0.12)
     page.wait_until(lambda: place_of(reader, "ring")[1] > 0.115, "the object to follow its handle")
     moved = place_of(reader, "ring")
@@ -168,15 +172,47 @@ def test_chosen_file_is_refused_or_placed_changed_and_removed(
     page.page.select_option("#unit", "cm")
     page.wait_until(lambda: "1040 × 1040 × 240 mm" in shown(page), "the other unit")
     np.testing.assert_allclose(place_of(reader, "ring"), moved, atol=1e-9)
-    page.type_number("Scale", 0.15)
+    form.get_by_label("Scale").fill("0.15")
+    form.get_by_label("Scale").press("Enter")
     page.wait_until(lambda: objects(reader)["ring"].scale == 0.15, "the scale")
     page.page.select_option("#unit", "")
     clear_refusals(page)
     page.keep(artefacts / "app-objects.png")
-    page.frame.get_by_role("button", name="Remove", exact=True).scroll_into_view_if_needed()
-    page.click_button("Remove")
+    form.get_by_role("button", name="Remove", exact=True).click()
     page.wait_until(lambda: objects(reader).keys() == before, "it to go")
-    page.wait_until(lambda: page.chosen("Object") in before, "another object to be chosen")
+    page.wait_until(lambda: choice.input_value() in before, "another object to be chosen")
+
+
+@pytest.mark.long
+def test_chosen_object_is_edited_in_the_sheet(page: ViserPage, reader: Client) -> None:
+    before = set(objects(reader))
+    page.press_in_bar("Objects")
+    form = page.page.locator("#object")
+    part: Any = {"name": "part.stl", "mimeType": "model/stl", "buffer": cube(40.0)}
+    page.page.set_input_files("#object-file", part)
+    page.wait_until(lambda: form.get_by_label("Object").input_value() == "part", "the object")
+    place = place_of(reader, "part")
+    form.get_by_label("Colour", exact=True).fill("#ff8800")
+    page.wait_until(lambda: objects(reader)["part"].colour == "#ff8800", "the colour")
+    form.get_by_role("button", name="Own colour").click()
+    page.wait_until(lambda: objects(reader)["part"].colour is None, "its own colour")
+    form.get_by_label("Opacity").fill("40")
+    page.wait_until(lambda: objects(reader)["part"].opacity == 0.4, "the opacity")
+    form.get_by_label("Turn").fill("-90")
+    turned = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+
+    def has_turned() -> bool:
+        return np.allclose(np.array(objects(reader)["part"].T)[:3, :3], turned, atol=1e-9)
+
+    page.wait_until(has_turned, "the turn")
+    np.testing.assert_allclose(place_of(reader, "part"), place, atol=1e-9)
+    form.get_by_label("Hidden").check()
+    page.wait_until(lambda: objects(reader)["part"].hidden, "it to be hidden")
+    form.get_by_label("Hidden").uncheck()
+    form.get_by_role("button", name="Here").click()
+    page.wait_until(lambda: not objects(reader)["part"].hidden, "it to be shown")
+    form.get_by_role("button", name="Remove", exact=True).click()
+    page.wait_until(lambda: objects(reader).keys() == before, "it to go")
 
 
 @pytest.mark.long

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from katana450.client import connect
+from katana450.client import Client, connect
+from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, clear_stop, resume, take
 from tests.browser.sizes import PHONE, PORTRAIT
+from tests.browser.teach_sheet import open_sheet, press
 from tests.gateway.test_programs import wait as wait_progress
 
 pytestmark = pytest.mark.long
 
-STEP_3 = ".steps li:nth-child(3) button"
+STEP_3 = "#teach .steps li:nth-child(3)"
+
+PLANNED = 60.0
+"""Timeout [s] of a plan, on a busy machine."""
+
+
+def wait_plan(arm: Client, until: Callable[[answers.ProgramPlan], bool]) -> None:
+    due = time.monotonic() + PLANNED
+    while not until(arm.query(answers.ProgramPlan)):
+        assert time.monotonic() < due
+        time.sleep(0.05)
 
 
 def test_steps_of_a_program_are_controlled_in_the_list(
@@ -23,26 +37,26 @@ def test_steps_of_a_program_are_controlled_in_the_list(
 ) -> None:
     page = open_page(server.url, nodes=("/arm", MOVE), window=PORTRAIT, own_camera=True, **PHONE)
     take(page)
-    page.frame.locator("#k450-sheet").tap()
-    page.frame.get_by_role("tab", name="Programs").click()
-    page.frame.get_by_role("button", name="Preview").click()
-    page.frame.locator(STEP_3).first.wait_for(timeout=60_000)
-    # The tab has the width of the panel.
-    panel = page.frame.locator(".steps").bounding_box()
-    tabs = page.frame.locator("[role=tablist]").bounding_box()
-    assert panel is not None
-    assert tabs is not None
-    assert panel["width"] >= 0.8 * tabs["width"]
+    open_sheet(page)
+    page.page.locator("#teach > select").select_option("Circle with gripper")
+    press(page, "Preview")
+    page.page.locator(STEP_3).wait_for(timeout=60_000)
 
     with connect(server.url, "Reader") as reader:
-        pause = page.frame.locator(f"{STEP_3}[name=pause]")
+        # The scene shows the arm at a time of the preview.
+        slider = page.page.get_by_role("slider", name="Look at the time of the preview")
+        slider.fill("1")
+        wait_plan(reader, lambda plan: plan.look == 1.0 and plan.steps[-1].mark == "")
+        page.wait_until(lambda: page.page.locator(".steps [aria-current]").count() == 1, "the step")
+        assert "1.0 s of" in (slider.get_attribute("aria-valuetext") or "")
+        pause = page.page.get_by_role("button", name="Pause before step 3", exact=True)
         pause.click()
         wait_progress(reader, lambda run: run.breakpoints == (3,))
         page.wait_until(lambda: pause.get_attribute("aria-pressed") == "true", "the breakpoint")
-        # The list is drawn again, and the button keeps the focus.
+        # The list changes, and the button keeps the focus.
         page.wait_until(lambda: pause.evaluate("each => each.matches(':focus')"), "the focus")
         page.keep(artefacts / "run_control.png")
-        page.frame.locator(".steps li:nth-child(2) button[name=run]").click()
+        page.page.get_by_role("button", name="Run from step 2", exact=True).click()
         wait_progress(reader, lambda run: run.status == "running" and run.step == 2)
         page.press_in_bar("STOP")
         wait_progress(reader, lambda run: run.status == "stopped")

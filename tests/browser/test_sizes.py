@@ -151,16 +151,17 @@ def test_window_is_as_its_system_until_its_person_chooses(desk: ViserPage) -> No
     for scheme in ("dark", "light"):
         desk.page.emulate_media(color_scheme=scheme)
         desk.wait_until(lambda scheme=scheme: themes() == (scheme, scheme), scheme)  # type: ignore[misc]
-    desk.open_tab("Scene")
-    desk.click_button("Dark")
+    desk.page.click("#more-button")
+    chosen = desk.page.get_by_label("Theme", exact=True)
+    chosen.select_option("Dark")
     desk.wait_until(lambda: themes() == ("dark", "dark"), "the choice")
-    desk.click_button("Light")
+    chosen.select_option("Light")
     desk.wait_until(lambda: themes() == ("light", "light"), "the other choice")
     desk.page.emulate_media(color_scheme="dark")
     desk.page.wait_for_timeout(200)
     assert themes() == ("light", "light")
     desk.page.emulate_media(color_scheme="light")
-    desk.open_tab("Drive")
+    desk.page.click("#more-button")
 
 
 @pytest.mark.long

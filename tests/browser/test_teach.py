@@ -1,4 +1,4 @@
-"""The Teach sheet: poses are recorded, ordered and played; their text is edited, run and saved."""
+"""The sheet of programs: poses are recorded and run; their text is edited, run and saved."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tests.browser.teach_sheet import (
 
 @pytest.fixture
 def sheet(new_page: ViserPage) -> ViserPage:
-    """Return a new window of the driver with the Teach sheet open."""
+    """Return a new window of the driver with the sheet of programs open."""
     open_sheet(new_page)
     return new_page
 
@@ -88,23 +88,32 @@ def test_poses_are_taught_reordered_played_and_kept(
 
 
 @pytest.mark.long
-def test_step_and_go_move_to_one_pose_and_never_past_a_stop(sheet: ViserPage, truth: Truth) -> None:
+def test_step_and_go_move_to_one_place_and_never_past_a_stop(
+    sheet: ViserPage, truth: Truth
+) -> None:
     teach(sheet, truth, (20.0, -25.0))
 
     def at(turn: float) -> Callable[[], bool]:
         return lambda: abs(np.degrees(truth.status()["q"][0]) - turn) < 0.01
 
-    for number, turn in enumerate((20.0, -25.0, 20.0), 1):
-        press(sheet, "Step")
-        sheet.wait_until(at(turn), f"pose {number}", seconds=PLAYED)
-        sheet.wait_until(lambda: "is at pose" in says(sheet), "the end", seconds=PLAYED)
+    press(sheet, "Steps")
+    press(sheet, "Step")
+    sheet.wait_until(at(20.0), "pose 1", seconds=PLAYED)
+    sheet.wait_until(lambda: bar(sheet, "headline").startswith("Paused"), "the pause")
+    # The steps of a pose and of its gripper.
+    press(sheet, "Run")
+    sheet.wait_until(lambda: says(sheet) == "Done.", "the end", seconds=PLAYED)
+    assert at(-25.0)()
+    press(sheet, "Poses")
+    press(sheet, "Go to pose 1: the arm moves there, the gripper stays")
+    sheet.wait_until(at(20.0), "pose 1")
     press(sheet, "Go to pose 2: the arm moves there, the gripper stays")
     sheet.wait_until(at(-25.0), "pose 2")
     sheet.page.keyboard.press("Space")
     truth.wait(mood="stopped")
     press(sheet, "Go to pose 1: the arm moves there, the gripper stays")
     sheet.wait_until(lambda: "stopped" in says(sheet), "the refusal")
-    press(sheet, "Play")
+    press(sheet, "Run")
     sheet.wait_until(lambda: "stop" in says(sheet).lower(), "the refusal", seconds=PLAYED)
     clear_stop(sheet, truth)
     sheet.page.wait_for_timeout(200)
@@ -112,7 +121,7 @@ def test_step_and_go_move_to_one_pose_and_never_past_a_stop(sheet: ViserPage, tr
 
 
 @pytest.mark.long
-def test_play_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> None:
+def test_run_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> None:
     """A press that waits on its way while the arm is stopped and cleared moves nothing."""
     teach(sheet, truth, (20.0, -25.0))
     sheet.page.click("#stop")
@@ -128,53 +137,41 @@ def test_play_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> N
             };
         }"""
     )
-    for button in ("Play", "Go to pose 1: the arm moves there, the gripper stays"):
+    for button in ("Run", "Go to pose 1: the arm moves there, the gripper stays"):
         press(sheet, button)
         sheet.wait_until(lambda: "Do it again" in says(sheet), "the refusal")
-        press(sheet, "Undo in Teach")
-        press(sheet, "Redo in Teach")
+        press(sheet, "Undo in Programs")
+        press(sheet, "Redo in Programs")
     sheet.page.wait_for_timeout(200)
     assert truth.status()["q"] == q
 
 
-def listed(page: ViserPage, script: str) -> bool:
-    """Return whether the list of the panel, which follows the folder, has a script."""
-    lists = page.messages("GuiUpdateMessage") + page.messages("GuiDropdownMessage")
-    options = [message.body.get("updates", message.body.get("props", {})) for message in lists]
-    return any(script in option.get("options", ()) for option in options)
-
-
-def test_chosen_script_of_the_panel_is_edited_as_text(
+def test_script_of_the_folder_is_opened_and_undone(
     window: ViserPage, truth: Truth, artefacts: Path
 ) -> None:
     prepare(window, truth)
     page = window.page
-    # It has only poses, and is shown as text nevertheless.
+    text = "steps:\n  - joints: [0, -68, 85, 8, 0]\n"
     saved = page.evaluate(
         "async (body) => (await fetch('api/v1/scripts/Taught', { method: 'POST', body })).status",
-        "steps:\n  - joints: [0, -68, 85, 8, 0]\n",
+        text,
     )
     assert saved == 204
-    window.frame.get_by_role("tab", name="Programs").click()
-    # The list follows the folder.
-    window.wait_until(lambda: listed(window, "Taught"), "the script in the list")
-    window.choose("Script", "Taught")
-    window.wait_until(
-        lambda: window.frame.locator("[data-script=Taught]").count() == 1, "the button"
-    )
-    window.frame.get_by_role("button", name="Edit as text").click()
+    open_sheet(window)
+    program = page.locator("#teach").get_by_label("Program", exact=True)
+    program.select_option("Taught")
+    # It has only poses.
+    window.wait_until(lambda: rows(window).count() == 1, "the pose")
+    assert program.locator("option:checked").inner_text() == "Taught"
+    press(window, "Text")
     area = page.locator("#teach-text")
-    area.wait_for()
-    window.wait_until(lambda: "steps:" in area.input_value(), "the text")
-    chosen = window.frame.get_by_label("Script", exact=True).input_value()
-    assert area.input_value() == page.evaluate(
-        "async (name) => (await fetch(`api/v1/scripts/${name}`)).text()", chosen
-    )
+    assert "joints: [0, -68, 85, 8, 0]" in area.input_value()
     assert page.locator("#teach-problems li").count() == 0
-    window.keep(artefacts / "panel-edit-as-text.png")
-    # What was in Teach before returns.
-    page.get_by_role("button", name="Undo in Teach").click()
-    area.wait_for(state="hidden")
+    window.keep(artefacts / "programs-text.png")
+    for _ in range(3):
+        press(window, "Undo in Programs")
+    # What was there before returns.
+    window.wait_until(lambda: rows(window).count() == 0, "the empty list")
     assert window.errors == []
 
 
@@ -182,7 +179,7 @@ def test_chosen_script_of_the_panel_is_edited_as_text(
 def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefacts: Path) -> None:
     teach(sheet, truth, (20.0, -25.0))
     page = sheet.page
-    press(sheet, "Edit as text")
+    press(sheet, "Text")
     area = page.locator("#teach-text")
     assert taught(parse(area.input_value())) is not None
     area.press("Control+End")
@@ -194,7 +191,7 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
     line = area.input_value().count("\n")
     assert re.match(rf"Line {line} .*did you mean 'wait'", problem.inner_text())
     sheet.keep(artefacts / "teach-text-problem.png")
-    press(sheet, "Play")
+    press(sheet, "Run")
     sheet.wait_until(lambda: "not run" in says(sheet), "the refusal")
     problem.click()
     selected = "(each) => each.value.slice(each.selectionStart, each.selectionEnd)"
@@ -203,18 +200,18 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
     page.wait_for_selector("#teach-problems button", state="detached")
     sheet = reload(sheet)
     assert area.input_value().endswith("[5, -68, 85, 8, 0]\n")
-    press(sheet, "Play")
+    press(sheet, "Run")
     sheet.wait_until(lambda: says(sheet) == "Done.", "the end", seconds=PLAYED)
     assert np.degrees(truth.status()["q"][0]) == pytest.approx(5.0, abs=0.01)
-    press(sheet, "Edit as poses")
+    press(sheet, "Poses")
     sheet.wait_until(lambda: turns(sheet) == [20, -25, 5], "the poses")
     # A place that cannot be reached is found in planning, and named by its line.
-    press(sheet, "Edit as text")
+    press(sheet, "Text")
     area.fill("name: Far\nsteps:\n  - home\n  - move: {x: 1900, y: 0, z: 0}\n")
-    press(sheet, "Play")
+    press(sheet, "Run")
     sheet.wait_until(lambda: page.locator("#teach-problems li").count() == 1, "it", seconds=PLAYED)
     assert page.inner_text("#teach-problems").startswith("Line 4 ")
-    press(sheet, "Edit as poses")
+    press(sheet, "Poses")
     sheet.wait_until(lambda: "no poses" in says(sheet), "the refusal")
     assert area.is_visible()
     # A mistake in an attached file is named by that file, and marks no line of the script.
@@ -229,11 +226,11 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
 def test_space_is_typed_in_the_text_of_a_moving_arm_and_escape_stops_it(
     sheet: ViserPage, truth: Truth, artefacts: Path
 ) -> None:
-    press(sheet, "Edit as text")
+    press(sheet, "Text")
     area = sheet.page.locator("#teach-text")
     text = "name: Slow\nspeed: 0.05\nsteps:\n  - joints: [60, -68, 85, 8, 0]\n"
     area.fill(text)
-    press(sheet, "Play")
+    press(sheet, "Run")
     area.focus()
     truth.wait(PLAYED, moving=True)
     sheet.wait_until(lambda: mood(sheet.page) == "program", "the bar")
@@ -264,7 +261,7 @@ def test_space_stops_the_arm_from_everything_but_a_text(sheet: ViserPage, truth:
         clear_stop(sheet, truth)
         assert truth.status()["stopped"] is None, what
 
-    press(sheet, "Edit as text")
+    press(sheet, "Text")
     area = page.locator("#teach-text")
     area.click()
     # A press in the scene is the end of typing.
@@ -272,7 +269,7 @@ def test_space_stops_the_arm_from_everything_but_a_text(sheet: ViserPage, truth:
     before = area.input_value()
     stops("the scene")
     assert area.input_value() == before
-    page.locator("#teach").get_by_label("Open a script").focus()
+    page.locator("#teach").get_by_label("Program", exact=True).focus()
     stops("a list of the page")
     sheet.number_box("1 base turn").click()
     stops("a number of the panel")
@@ -316,10 +313,8 @@ def test_script_is_saved_in_the_folder_and_listed(
     sheet.wait_until(lambda: "exists already" in says(sheet), "the refusal")
     # The browser notes the refusal on its console.
     sheet.errors.clear()
-    sheet.open_tab("Programs")
-    assert "Teach" not in sheet.panel_text()
-    sheet.choose("Script", "Two words")
-    # A script of the library has other steps, so it is shown as text.
-    sheet.page.locator("#teach").get_by_label("Open a script").select_option("Square")
-    sheet.wait_until(lambda: "shown as text" in says(sheet), "the text")
+    assert "Two words" in sheet.page.locator("#teach > select").inner_text()
+    # A script of the library has other steps than poses.
+    sheet.page.locator("#teach").get_by_label("Program", exact=True).select_option("Square")
+    sheet.wait_until(lambda: says(sheet) == "Square is opened.", "the script")
     assert "repeat:" in sheet.page.locator("#teach-text").input_value()

@@ -336,13 +336,6 @@ def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page
         assert ask(page, count.format("PANEL_HANDLE")) == 1
         slider = page.frame.get_by_text("Height", exact=True)
         assert slider.is_visible()
-    with part("TABS"):
-        assert ask(page, count.format("TABS")) == 1
-    with part("TAB"):
-        chosen = "[...document.querySelectorAll(Viser.TAB)].map((each) => each.ariaSelected)"
-        assert ask(page, chosen) == ["true", "false"]
-        ask(page, "document.querySelectorAll(Viser.TAB)[1].click()")
-        page.wait_until(lambda: ask(page, chosen) == ["false", "true"], "the other tab")
     with part("PANEL_HANDLE"):
         tall = ask(page, "document.querySelector(Viser.PANEL).clientHeight")
         ask(page, "document.querySelector(Viser.PANEL_HANDLE).click()")

@@ -33,10 +33,6 @@ def furnish(server: viser.ViserServer) -> None:
     gui.add_vector3("Point", (1.0, 2.0, 3.0), min=(-5.0, -6.0, -7.0), max=(5.0, 6.0, 7.0), step=0.5)
     view = gui.add_button_group("View", ("Front", "Side"), hint="Where to look from")
 
-    tabs = gui.add_tab_group()
-    for label in ("One", "Two"):
-        tabs.add_tab(label)
-
     async def lift(_: object) -> None:
         box.position = (0.0, 0.0, slider.value)
 

@@ -63,8 +63,10 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
 def ask(
     table: Staged, participant: Participant, then: ProgramOrder | None = ProgramOrder.RUN
 ) -> None:
-    """Request ``SCRIPT`` as the panel of the page does."""
-    table.panel.plan(SCRIPT, then, participant.actor)
+    """Request ``SCRIPT``, and what follows its planning, as the page does."""
+    table.programs.script(participant, SCRIPT, more=False, speed=1.0)
+    if then is not None:
+        table.programs.steer(participant, then)
     table.wait(0.1, participant)
 
 
@@ -145,8 +147,6 @@ def test_run_requested_during_a_stop_is_refused(table: Staged, slow: Slow) -> No
     program_runner = table.programs
     with pytest.raises(LeaseError, match="clear the stop first"):
         program_runner.steer(participant, ProgramOrder.RUN)
-    with pytest.raises(LeaseError, match="clear the stop first"):
-        table.panel.plan(SCRIPT, ProgramOrder.RUN, participant.actor)
     finish(table, participant, slow)
     q = table.arm.rest.setpoint + 0.01
     motion = replace(table.arm.rest.motion, q=q)

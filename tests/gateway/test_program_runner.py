@@ -13,12 +13,11 @@ import pytest
 
 from katana450.arm.control.actor import Grounds
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import Role
 from katana450.arm.control.session.session import Session
 from katana450.errors import LeaseError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.serve_options import OWNER_SILENCE
-from katana450.extensions.programs.server.panel import PanelAccess
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.server_commands.people_requests import PeopleRequests
 from katana450.server.api import answers, requests
@@ -32,8 +31,6 @@ from katana450.server.service.participants import Participant
 from katana450.server.service.people import Connection
 from tests.gateway.test_hub import PAGES, Table
 from tests.waiting import until
-
-NOBODY = Person("nobody", "Nobody", Role.ADMIN)
 
 SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
@@ -52,7 +49,6 @@ class Staged(Table):
         self.arm.session, self.arm.arm = session, Mock(T_base_shoulder=np.eye(4))
         assert isinstance(self.hub.runner, ProgramRunner)
         self.programs = self.hub.runner
-        self.panel = PanelAccess(self.programs, self.hub, lambda act: act())
 
     @property
     def progress(self) -> answers.Progress:
@@ -124,12 +120,9 @@ def test_others_may_steer_a_program_only_if_they_may_take_the_lease(table: Stage
     program_runner.steer(owner, ProgramOrder.RUN)
     for participant, reason in ((viewer, "watch"), (other, "belongs to Window 1")):
         with pytest.raises(LeaseError, match=reason):
-            program_runner.check_may_touch(participant.actor)
-        with pytest.raises(LeaseError, match=reason):
             program_runner.steer(participant, ProgramOrder.END)
     with pytest.raises(LeaseError, match="End it first"):
         table.plan(other)
-    program_runner.check_may_touch(admin.actor)
     program_runner.steer(admin, ProgramOrder.END)
     assert table.status == "stopped"
     assert table.hub.lease.holder is None
@@ -182,13 +175,10 @@ def test_stop_that_another_person_clears_leaves_the_lease_to_the_owner(table: St
     assert table.hub.lease.holder == other.person
 
 
-def test_panel_request_is_executed_after_planning(table: Staged) -> None:
+def test_run_during_planning_is_executed_after_it(table: Staged) -> None:
     participant = table.join(PAGES[0])
-    with pytest.raises(LeaseError, match="start page"):
-        table.panel.plan(SCRIPT, ProgramOrder.RUN, replace(participant.actor, person=NOBODY))
-    table.panel.plan(SCRIPT, ProgramOrder.RUN, participant.actor)
-    with pytest.raises(LeaseError, match="being planned"):
-        table.panel.plan(SCRIPT, ProgramOrder.RUN, participant.actor)
+    table.programs.script(participant, SCRIPT, more=False, speed=1.0)
+    table.programs.steer(participant, ProgramOrder.RUN)
     due = time.monotonic() + 10.0
     while table.status in ("planning", "ready") and time.monotonic() < due:
         table.wait(0.02, participant)
@@ -196,22 +186,22 @@ def test_panel_request_is_executed_after_planning(table: Staged) -> None:
     assert table.status == "running"
 
 
-def test_command_from_before_a_stop_is_not_executed_after_it(table: Staged) -> None:
+def test_run_from_before_a_stop_is_not_executed_after_it(table: Staged) -> None:
     participant = table.join(PAGES[0])
-    program_runner = table.programs
-    table.panel.plan(SCRIPT, ProgramOrder.RUN, participant.actor)
-    clicked = table.hub.at_scene(participant.person.key, table.hub.gate.revocations)
+    table.programs.script(participant, SCRIPT, more=False, speed=1.0)
+    table.programs.steer(participant, ProgramOrder.RUN)
+    revocations = table.hub.gate.revocations
     table.stop("Anybody")
     table.hub.move(participant, cmd.ClearStop())
-    # A click that waited in the socket meanwhile.
+    # An order that waited in the socket meanwhile.
+    dispatcher = Dispatcher(table.hub)
+    late = Steer(order=ProgramOrder.RUN, revocations=revocations)
     with pytest.raises(LeaseError, match="Do it again"):
-        table.panel.plan(SCRIPT, ProgramOrder.RUN, clicked)
-    with pytest.raises(LeaseError, match="Do it again"):
-        table.panel.steer(ProgramOrder.RUN, clicked)
+        dispatcher.handle(participant, late, Budgets(table.hub.clock).of("page"))
     until(lambda: table.status != "planning", 60.0)
     table.wait(1.0, participant)
     assert table.status == "ready"
-    assert not program_runner.running
+    assert not table.programs.running
 
 
 def test_program_of_the_driver_supersedes_the_planning_of_another(table: Staged) -> None:

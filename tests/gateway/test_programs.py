@@ -14,7 +14,7 @@ import pytest
 
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
-from katana450.server.api.program_requests import Breakpoints, Program, ProgramOrder, Steer
+from katana450.server.api.program_requests import Breakpoints, Preview, Program, ProgramOrder, Steer
 from tests.gateway.client import Control
 from tests.gateway.postures import FAR
 from tests.gateway.virtual import VirtualServer
@@ -199,6 +199,39 @@ def test_program_begins_at_a_step_and_pauses_before_another(ready: Client) -> No
     done = ended(ready)
     assert (done.status, done.skipped) == ("done", (1, 2))
     assert posture(ready) == pytest.approx(END, abs=1e-9)
+
+
+def test_plan_has_the_steps_and_the_time_that_is_looked_at(ready: Client) -> None:
+    plan = ready.query(answers.ProgramPlan)
+    assert plan.program is not None
+    assert plan.text.startswith("name: Three steps")
+    assert [step.mark for step in plan.steps] == ["", "", ""]
+    assert plan.seconds == plan.program.seconds
+    assert plan.seconds == pytest.approx(sum(step.seconds for step in plan.steps))
+    first = plan.steps[0].seconds
+    ready.ask(Preview(at=first + 0.01))
+    plan = ready.query(answers.ProgramPlan)
+    assert plan.look == first + 0.01
+    assert [step.mark for step in plan.steps] == ["", "shown", ""]
+    ready.ask(Preview(at=1e9))
+    assert ready.query(answers.ProgramPlan).look == plan.seconds
+    ready.ask(Steer(order=ProgramOrder.RUN))
+    wait(ready, lambda status: status.step == 2)
+    with pytest.raises(RefusedError, match="the arm itself shows it"):
+        ready.ask(Preview(at=1.0))
+    plan = ready.query(answers.ProgramPlan)
+    assert [step.mark for step in plan.steps] == ["done", "now", "next"]
+    assert (plan.seconds, plan.look) == (0.0, 0.0)
+    ended(ready)
+    with pytest.raises(RefusedError, match="Plan the program from its beginning"):
+        ready.ask(Preview(at=1.0))
+
+
+def test_preview_of_nothing_is_refused(arm: Client) -> None:
+    plan = arm.query(answers.ProgramPlan)
+    assert (plan.text, plan.program, plan.steps) == ("", None, ())
+    with pytest.raises(RefusedError, match="No program is planned"):
+        arm.ask(Preview(at=1.0))
 
 
 def test_step_that_does_not_exist_is_refused(ready: Client) -> None:

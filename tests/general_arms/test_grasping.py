@@ -13,7 +13,7 @@ import viser
 from katana450.arm.control.state.state import State
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.server.preview import Preview
+from katana450.extensions.programs.server.preview import PreviewNodes
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry.arrays import FloatArray
 from tests.general_arms.gripping_arms import gripping_urdf
@@ -134,8 +134,8 @@ def test_preview_shows_the_object_in_the_hand(server: viser.ViserServer, tmp_pat
     box = item("part", "box", bench.box, bench.near, 17.0)
     plan = planned(tmp_path, gripping_urdf("OpenMANIPULATOR-X"), ["pick: part"], box)
     lifted = run_by_clock(plan).states[-50]
-    preview = Preview(server, plan.robot, lambda: plan.session)
-    assert preview.show(plan.program, plan.start) > 0.0
+    preview = PreviewNodes(server, plan.robot, lambda: plan.session)
+    preview.show(plan.program, plan.start)
     preview.look(lifted.t)
     for thread in [candidate for candidate in threading.enumerate() if candidate.name == "preview"]:
         thread.join(60.0)

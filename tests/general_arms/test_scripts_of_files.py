@@ -14,7 +14,7 @@ from katana450.errors import KatanaError
 from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse, script_schema
 from katana450.extensions.programs.script.script_files import script_text
-from katana450.extensions.programs.server.preview import Preview
+from katana450.extensions.programs.server.preview import PreviewNodes
 from katana450.extensions.programs.server.traces import Traces, coloured
 from katana450.maths.kinematics.chain import Chain
 from tests.general_arms.chain_urdf import chain_urdf
@@ -43,8 +43,9 @@ def test_example_is_valid_for_editors() -> None:
 def test_preview_and_trace_show_the_curves(server: viser.ViserServer, ur5e_file: Path) -> None:
     plan = plan_script(parse(script_text(SCRIPT)), ur5e_file)
     states = run_by_clock(plan).states
-    preview = Preview(server, plan.robot, lambda: plan.session)
-    span = preview.show(plan.program, plan.start)
+    preview = PreviewNodes(server, plan.robot, lambda: plan.session)
+    preview.show(plan.program, plan.start)
+    span = plan.program.duration
     assert span == pytest.approx(states[-1].t, abs=0.3)
     preview.look(0.5 * span)
     for thread in [candidate for candidate in threading.enumerate() if candidate.name == "preview"]:

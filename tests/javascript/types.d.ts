@@ -3,11 +3,11 @@ declare namespace Api {
   interface Acquire { do: "acquire"; id?: number | string | null; revocations?: number | null; made?: number | null; }
   type Act = Acquire | Ask | Attach | Branch | Breakpoints | ChooseRobot | ClearStop | Decline | EndDrag | Fill | Get |
     Give | Go | GoToZero | Gripper | Heartbeat | Hello | Hold | Home | Jog | Joint | Joints | Kick | ListPeople | Load |
-    Nudge | OperateArm | Orient | Pause | Place | Pose | Position | Program | Query | Redo | ReleaseLease | Remove |
-    Rename | Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn | TurnElbow |
-    Undo | Watch | Withdraw;
-  type Answer = Arm | Branches | Done | Echo | Links | Loop | Mesh | Objects | People | Refused | Scene | State | Values
-    | Welcome | World;
+    Nudge | OperateArm | Orient | Pause | Place | Pose | Position | Preview | Program | Query | Redo | ReleaseLease |
+    Remove | Rename | Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn |
+    TurnElbow | Undo | Watch | Withdraw;
+  type Answer = Arm | Branches | Done | Echo | Links | Loop | Mesh | Objects | People | ProgramPlan | Refused | Scene |
+    State | Values | Welcome | World;
   interface Arm { is: "arm"; id?: number | string | null; name: string; joints: string[]; lower: number[];
     upper: number[]; speed: number[]; acceleration: number[]; jerk: number[]; ready: number[];
     tools: Record<string, number[][]>; default_tool: string | null; gripper: [number, number, number] | null;
@@ -114,15 +114,20 @@ declare namespace Api {
     made?: number | null; wait?: number | null; }
   interface Position { do: "position"; p: number[]; frame?: Frame; id?: number | string | null;
     revocations?: number | null; made?: number | null; wait?: number | null; }
+  interface Preview { do: "preview"; id?: number | string | null; revocations?: number | null; made?: number | null;
+    at: number; }
   type Priority = "orientation" | "pose" | "position" | "position and pitch";
   interface Program { do: "program"; id?: number | string | null; revocations?: number | null; made?: number | null;
     text: string; more?: boolean; speed?: number; }
   type ProgramOrder = "continue" | "end" | "pause" | "resume" | "run" | "step";
+  interface ProgramPlan { is: "program_plan"; id?: number | string | null; text?: string; program?: Progress | null;
+    steps?: ProgramStep[]; seconds?: number; look?: number; }
+  interface ProgramStep { name: string; seconds: number; mark: string; }
   interface Progress { name: string; by: string; status: string; step: number; steps: number; line: number;
     task: string; fraction: number; seconds: number; seconds_left: number; why: string; skipped: number[];
     unattended: boolean; began: string | null; breakpoints: number[]; can_continue: boolean; }
   interface Query { do: "query"; id?: number | string | null; revocations?: number | null; made?: number | null;
-    at?: "arm" | "branches" | "links" | "loop" | "objects" | "state" | "world"; }
+    at?: "arm" | "branches" | "links" | "loop" | "objects" | "program_plan" | "state" | "world"; }
   interface Redo { do: "redo"; id?: number | string | null; revocations?: number | null; made?: number | null;
     wait?: number | null; }
   interface Refused { is: "refused"; id?: number | string | null; why: string; code?: string; retry?: number | null;

@@ -23,14 +23,13 @@ from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
 from katana450.extension import provided
 from katana450.extensions.bodies.robot_world import robot_world
 from katana450.extensions.objects.handles import HandlesLayer
-from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.recording.playback.drawing import CONTEXTS, RunDrawing
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.hub import Hub
 from katana450.server.view.panel import Panel
-from katana450.server.view.panel_folder import FolderContext, PanelFolder, PanelTabs
+from katana450.server.view.panel_folder import FolderContext, PanelFolder
 from katana450.server.view.readout import joint_page
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.view import Additions, View
@@ -94,7 +93,7 @@ def test_panel_has_a_slider_per_joint_and_shows_the_reason(
         assert controls[label].min >= unit * joints.lower[axis] - 1e-9
         assert controls[label].max <= unit * joints.upper[axis] + 1e-9
         # No joint name can produce a label that the guard treats differently.
-        assert label not in (*PERSONAL, *ProgramRunner.controls)
+        assert label not in PERSONAL
     assert "mm" in joint_page(joints, labels, state)
     assert "Pose by numbers" not in [getattr(h, "label", "") for h in internals.panel(server)]
     texts = [h.content for h in internals.panel(server) if isinstance(h, viser.GuiHtmlHandle)]
@@ -115,7 +114,7 @@ def test_objects_and_floor_are_shown_at_the_height_of_the_table(
     gestures = RecordedGestures()
     additions = Additions((HandlesLayer(),), Meshes())
     view = View(server, robot, publisher, gestures, lambda: 0, session, 30.0, additions)
-    view.add_panel(lambda _: ())
+    view.add_panel(lambda: ())
     floor: Any = internals.nodes(server)["/floor"]
     assert floor.position[2] == pytest.approx(-0.3, abs=1e-3)
     state = session.step(publisher.snapshot.state, (cmd.PlaceObject(block(-0.3)),), 0.0)
@@ -136,16 +135,14 @@ def machine_view(
     )
     gestures = RecordedGestures()
 
-    def folders(tabs: PanelTabs) -> Iterator[PanelFolder]:
+    def folders() -> Iterator[PanelFolder]:
         context = FolderContext(
             server,
             robot,
             gestures,
             lambda: publisher.snapshot.state,
             hub,
-            lambda act: act(),
             options,
-            tabs,
         )
         for make in provided("folder"):
             if (folder := make(context)) is not None:
@@ -160,9 +157,6 @@ def machine_view(
 def test_extensions_add_what_needs_no_tool(server: viser.ViserServer, robot: Robot) -> None:
     hub = Hub(lambda: 0.0)
     machine_view(server, robot, hub, Namespace())
-    labels = [control.label for control in internals.controls(server)]
-    assert labels.count("Opacity") == labels.count("Turn") == 1
-    assert not {"Script", "Program"} & set(labels)
     # Windows of this server can play back.
     assert CONTEXTS[hub].robot is robot
 

@@ -23,7 +23,6 @@ from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.arm.robot.props import load_props
 from katana450.extensions.importers.formats.mesh_file import read_mesh
 from katana450.extensions.objects.handles import ObjectHandles
-from katana450.extensions.objects.objects_panel import NOTHING, ObjectsPanel
 from katana450.maths.water.environment import TableTop
 from katana450.server.view.paint import Tint
 from katana450.server.view.scene_objects import SceneObjectNodes
@@ -171,29 +170,3 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
     assert len(put) == 2
     assert "nothing carries it there" in shown[0]
     assert tuple(nodes._handles["cup"].position) == (0.74, 0.1, 0.0)
-
-
-def test_panel_shows_the_chosen_object(
-    server: viser.ViserServer, session: Session, state: State, mesh: Mesh
-) -> None:
-    panel = ObjectsPanel(server, RecordedGestures(), lambda: state, lambda: session.environment)
-    assert panel._choice.value == NOTHING
-    scene_object = SceneObject(
-        "it",
-        Shape.MESH,
-        (),
-        np.eye(4),
-        solid=mesh.solid,
-        scale=2.0,
-        appearance=ObjectAppearance((9, 8, 7)),
-    )
-    other = replace(scene_object, name="other", scale=1.0)
-    panel.follow(seen(state, scene_object), caught_up=True)
-    assert (panel._choice.value, panel._scale.value) == ("it", 2.0)
-    assert tuple(panel._colour.value) == (9, 8, 7)
-    panel.follow(seen(state, scene_object, other), caught_up=False)
-    assert panel._choice.value == "it"
-    panel.follow(seen(state, scene_object, other), caught_up=True)
-    assert (panel._choice.value, panel._scale.value) == ("other", 1.0)
-    panel.follow(seen(state, scene_object), caught_up=True)
-    assert (panel._choice.value, panel._scale.value) == ("it", 2.0)

@@ -20,7 +20,7 @@ from katana450.extension import ServerFacts, load, results
 from katana450.server.service.arm_handle import ArmHandle, Nodes
 from katana450.server.service.command_gate import guarded
 from katana450.server.view.layer import ViewLayer
-from katana450.server.view.panel_folder import FolderContext, PanelFolder, PanelTabs
+from katana450.server.view.panel_folder import FolderContext, PanelFolder
 from katana450.server.view.view import Additions, View
 
 NODES = "katana450.extensions.export.vrml.vrml_nodes:VrmlNodes"
@@ -102,7 +102,7 @@ class Frontend:
 
 
 def _folders(
-    gateway: Gateway, options: Namespace, robot: Robot, front_end: FrontEnd, tabs: PanelTabs
+    gateway: Gateway, options: Namespace, robot: Robot, front_end: FrontEnd
 ) -> Iterator[PanelFolder]:
     """Add the controls of the extensions to the panel. Raises KatanaError."""
     context = FolderContext(
@@ -111,8 +111,6 @@ def _folders(
         gateway.gestures,
         lambda: front_end.state_publisher.snapshot.state,
         gateway.hub,
-        gateway.call,
         options,
-        tabs,
     )
     yield from results("folder", context)

@@ -13,7 +13,6 @@ import socket
 import time
 from argparse import Namespace
 from collections.abc import Callable, Coroutine, Iterator
-from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -30,7 +29,6 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.assembly.page_routes import signed_in
 from katana450.assembly.web_server import WebServer
-from katana450.errors import LeaseError
 from katana450.extension import load, provided, results
 from katana450.server.api.fields import MAX_PRESS_LENGTH
 from katana450.server.service import status
@@ -54,9 +52,6 @@ log = logging.getLogger(__name__)
 
 REST_TICK = 0.2
 """[s] Interval of the checks while the arm rests and is not stopped; otherwise ``TICK``."""
-
-ANSWER_SECONDS = 2.0
-"""[s] Timeout of a thread of the view for an answer of the server's thread."""
 
 RUNNER = "katana450.extensions.programs.server.program_runner:ProgramRunner"
 """Class that drives the arm by scripts."""
@@ -142,27 +137,6 @@ class Gateway:
         # RuntimeError: the server has ended.
         with suppress(RuntimeError):
             self._web.loop.call_soon_threadsafe(act, *arguments)
-
-    def call(self, act: Callable[[], None]) -> None:
-        """Run ``act`` in the server's thread, and return afterwards. For any other thread.
-
-        Raises the error of ``act``, and LeaseError if the server does not answer.
-        """
-        future = Future[None]()
-
-        def done() -> None:
-            try:
-                act()
-            except Exception as error:
-                future.set_exception(error)
-            else:
-                future.set_result(None)
-
-        self._web.loop.call_soon_threadsafe(done)
-        try:
-            future.result(ANSWER_SECONDS)
-        except TimeoutError as error:
-            raise LeaseError("The server does not answer. Check the state of the arm.") from error
 
     def _watches(self) -> Iterator[Coroutine[Any, Any, None]]:
         """Yield the watchdogs of this process."""

@@ -25,7 +25,7 @@ EXTENSIONS = (
         serve_options=f"{HERE}.programs.serve_options:add_serve_options",
         view_layer=f"{HERE}.programs.server.traces:TracesLayer",
         routes=f"{HERE}.programs.server.script_routes:routes",
-        folder=f"{HERE}.programs.server.panel:programs_panel",
+        folder=f"{HERE}.programs.server.preview:program_preview",
     ),
     Extension(
         "robot_choice",
@@ -177,7 +177,6 @@ EXTENSIONS = (
         "objects",
         view_layer=f"{HERE}.objects.handles:HandlesLayer",
         handler=f"{HERE}.objects.object_requests:ObjectRequests",
-        folder=f"{HERE}.objects.objects_panel:ObjectsFolder",
     ),
     Extension("undo", handler=f"{HERE}.undo:UndoRequests"),
     Extension("conduit", view_layer=f"{HERE}.conduit.rings:ConduitLayer"),

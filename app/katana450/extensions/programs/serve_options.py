@@ -31,5 +31,5 @@ def add_serve_options(parser: ArgumentParser) -> None:
         "--programs",
         type=Path,
         metavar="DIR",
-        help="folder of scripts for the panel; taught scripts are saved there too",
+        help="folder of scripts for the page, which saves taught scripts there too",
     )

@@ -91,6 +91,39 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     can_continue: bool = False
 
 
+class ProgramStep(msgspec.Struct, frozen=True, kw_only=True):
+    """A step of a planned program.
+
+    Attributes:
+        name: Its name.
+        seconds: Its expected duration [s]; 0 if it is not expected to run.
+        mark: done, now, next, ended here or skipped while the program runs and afterwards; before
+            that, shown for the step at the time that is looked at; "" for all others.
+    """
+
+    name: str
+    seconds: float
+    mark: str
+
+
+class ProgramPlan(Answer, frozen=True, kw_only=True):
+    """The program that was sent last, with its steps once it is planned.
+
+    Attributes:
+        text: Its script; "" before the first one.
+        program: Its progress, as in the state; null before the first one.
+        steps: Its steps in their order, with those of all alternatives.
+        seconds: Duration of its preview [s]; 0 while there is none.
+        look: Time of the preview that the scene shows [s]; 0 for none.
+    """
+
+    text: str = ""
+    program: Progress | None = None
+    steps: tuple[ProgramStep, ...] = ()
+    seconds: float = 0.0
+    look: float = 0.0
+
+
 class Margins(msgspec.Struct, frozen=True, kw_only=True):
     """Distances to joint limits, singularity and contact.
 

@@ -87,5 +87,17 @@ class Breakpoints(Request, frozen=True, kw_only=True):
     steps: Annotated[tuple[Annotated[int, Meta(ge=1)], ...], Meta(max_length=MAX_BREAKPOINTS)]
 
 
-REQUESTS = (Program, Steer, Breakpoints)
+class Preview(Request, frozen=True, kw_only=True):
+    """Show arm, objects and water at a time of the planned program in the scene, before it runs.
+
+    Attributes:
+        at: [s] Time from the beginning of the program; 0 shows none.
+    """
+
+    traits: ClassVar[Traits] = Traits(extension=True)
+
+    at: Annotated[float, Meta(ge=0.0)]
+
+
+REQUESTS = (Program, Steer, Breakpoints, Preview)
 """All requests of this module."""

@@ -171,6 +171,8 @@ class Dispatcher:
         hub = self._hub
         if subject == "state":
             return serialize.state(hub)
+        if subject == "program_plan":
+            return hub.runner.plan()
         arm = hub.present()
         if subject == "loop":
             return serialize.loop(arm.loop_timing)

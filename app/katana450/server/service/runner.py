@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, NamedTuple
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Request
 from katana450.arm.control.lease import Person
@@ -60,12 +59,7 @@ class Runner(RequestHandler):
     A run joins the hub as a participant, holds the lease, and submits its commands through the
     gate. Meanwhile ``CommandGate.program`` names the run and its owner. The hub calls the methods
     below in the server's thread, except where they name another. A server has one runner.
-
-    Attributes:
-        controls: Labels of its controls in the panel. ``check_may_touch`` decides who may use them.
     """
-
-    controls: ClassVar[tuple[str, ...]] = ()
 
     @property
     def running(self) -> bool:
@@ -82,9 +76,6 @@ class Runner(RequestHandler):
 
     def end(self, participant: Participant, why: str) -> None:
         """End the run of ``participant``, unless it is unattended, because of ``why``, a clause."""
-
-    def check_may_touch(self, actor: Actor) -> None:
-        """Raise LeaseError where ``actor`` must not touch ``controls``. Called in any thread."""
 
     def tick(self) -> None:
         """Look at the arm and continue. Called every ``TICK`` after the watch over the driver."""
@@ -106,6 +97,10 @@ class Runner(RequestHandler):
 
     def progress(self) -> answers.Progress | None:
         """Return the progress of the present or last run; the state includes it."""
+
+    def plan(self) -> answers.ProgramPlan:
+        """Return the present or last program with its steps."""
+        return answers.ProgramPlan()
 
     def status_line(
         self,

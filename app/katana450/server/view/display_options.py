@@ -1,4 +1,4 @@
-"""Controls that change only the display: camera and theme."""
+"""The views of the camera, which change only the display."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 import viser
 
 from katana450.server.viser_bridge.presets import Preset
-from katana450.server.viser_bridge.themes import THEMES
 
 
 def add_views(gui: viser.GuiApi, look_from: Callable[[viser.ClientHandle, Preset], None]) -> None:
@@ -23,8 +22,3 @@ def add_views(gui: viser.GuiApi, look_from: Callable[[viser.ClientHandle, Preset
     def _(event: viser.GuiEvent[Any]) -> None:
         if event.client is not None:
             look_from(event.client, Preset(views.value))
-
-
-def add_themes(gui: viser.GuiApi) -> None:
-    """Add the theme buttons. The page changes its own theme; the server does not see the click."""
-    gui.add_button_group("Theme", tuple(THEMES), hint="Only for this window")

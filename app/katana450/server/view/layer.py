@@ -33,7 +33,7 @@ class LayerContext(NamedTuple):
 
 
 class ViewLayer:
-    """Nodes of the scene with controls in the folder "Show" of the panel. The base has none.
+    """Nodes of the scene that follow the state. The base has none.
 
     Attributes:
         needs_arm: Whether the layer is left out for a robot without an arm.
@@ -46,9 +46,6 @@ class ViewLayer:
 
     def attach(self, context: LayerContext) -> None:
         """Prepare for the arm of ``context``. Raises ConfigurationError."""
-
-    def add_controls(self, gui: viser.GuiApi) -> None:
-        """Add the controls to the open folder of ``gui``. Called once, after ``attach``."""
 
     def follow(self, state: State) -> None:
         """Show ``state``. Called for each state that is shown, so only changes may be sent."""

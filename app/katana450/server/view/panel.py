@@ -1,4 +1,4 @@
-"""The tab "Drive" of the panel: joints, gripper and postures, and the controls of the tool."""
+"""The panel: joints, gripper and postures, and the pose of the tool in numbers."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Panel:
         find: Find,
         state: State,
     ) -> None:
-        """Add the controls to the open tab of ``server``.
+        """Add the controls to the panel of ``server``.
 
         Args:
             server: viser's server.

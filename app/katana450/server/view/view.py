@@ -27,7 +27,7 @@ from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.paint import PaintNodes, Tint
 from katana450.server.view.panel import Panel
-from katana450.server.view.panel_folder import DRIVE, SCENE, AddFolders, PanelTabs
+from katana450.server.view.panel_folder import AddFolders
 from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scenery import Scenery
@@ -141,7 +141,7 @@ class View(ViewUpdater):
         """
         super().__init__(server, state_publisher, frame_rate)
         server.gui.set_panel_label(title(robot.name))
-        self._robot, self._layers = robot, additions.layers
+        self._robot = robot
         self._gestures, self._choices = gestures, session.choices
         self._last_ticket = last_ticket
         props = load_props()
@@ -172,16 +172,9 @@ class View(ViewUpdater):
         with server.atomic():
             # A drag shall not wait for it.
             self._ghost(GOAL, GHOST_COLOURS[Status.OK])
-            tabs = PanelTabs(server.gui)
-            with tabs.tab(DRIVE):
-                self._panel = Panel(server, self._robot, gestures, self._choices, snapshot.state)
-            self._folders = tuple(folders(tabs))
-            with tabs.tab(SCENE):
-                add_views(server.gui, self._look_from)
-                if self._robot.arm is not None:
-                    with server.gui.add_folder("Show"):
-                        for layer in self._layers:
-                            layer.add_controls(server.gui)
+            self._panel = Panel(server, self._robot, gestures, self._choices, snapshot.state)
+            self._folders = tuple(folders())
+            add_views(server.gui, self._look_from)
             # At the end of the panel, because the element takes an empty line.
             server.gui.add_html(style())
         self.show_panel(snapshot)

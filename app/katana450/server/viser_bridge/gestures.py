@@ -137,12 +137,6 @@ class Gestures:
                     browser.slot.refuse(str(refusal))
             return held
         actor = self._hub.at_scene(browser.slot.key, *stamp)
-        runner = self._hub.runner
-        if self._guard.is_of(message, runner.controls):
-            # The owner of a run may differ from the driver.
-            self._gate.check_current(actor)
-            runner.check_may_touch(actor)
-            return actor
         is_start = isinstance(message, wire.TransformControlsDragStartMessage)
         if is_start:
             check_in_time(actor.delay, self._gate.sample_delay)

@@ -14,7 +14,7 @@ from typing import Any
 import viser
 from viser import _messages as wire
 
-PERSONAL = ("View", "Theme")
+PERSONAL = ("View",)
 """Controls that affect only the window in which they are clicked."""
 
 WORKSPACE = 1.5
@@ -61,12 +61,6 @@ class Guard:
         if isinstance(message, wire.GuiUpdateMessage):
             return getattr(self._control(message), "label", None) not in PERSONAL
         return not isinstance(message, wire.ViewerCameraMessage)
-
-    def is_of(self, message: Any, labels: tuple[str, ...]) -> bool:
-        """Return whether ``message`` is for a control with one of ``labels``."""
-        if not isinstance(message, wire.GuiUpdateMessage):
-            return False
-        return getattr(self._control(message), "label", None) in labels
 
     def correction(self, message: Any) -> list[Any]:
         """Return the messages that make the sender's window show the real state again.

@@ -257,6 +257,15 @@ class Timeline:
         schedule = {task.number: task for task in program.schedule}
         return Timeline(tuple(pieces), firsts, schedule, program.schedule[-1].end)
 
+    @staticmethod
+    def previewed(program: Program) -> Timeline | None:
+        """Return the timeline of the preview of ``program``; None if it has none.
+
+        A program without motions has none, and one that continues in the middle of a motion.
+        """
+        timeline = Timeline.of(program)
+        return timeline if timeline.pieces and not program.first else None
+
     def at(self, t: float) -> tuple[FloatArray, float]:
         """Return the joints (5,) and the fingers [rad] at ``t`` [s], from 0 to ``span``.
 

@@ -44,14 +44,6 @@ class Scripts:
         return self._folder is not None
 
     @property
-    def changed(self) -> int:
-        """Time of the last change in the folder [ns]; 0 without a folder."""
-        try:
-            return 0 if self._folder is None else self._folder.stat().st_mtime_ns
-        except OSError:
-            return 0
-
-    @property
     def paths(self) -> Mapping[str, Path]:
         """Paths of the scripts by name; those of the folder come first and have precedence."""
         paths = {_shown(path): path for path in sorted(LIBRARY.glob(f"*{ENDING}"))}

@@ -1,1 +1,1 @@
-"""Programs on a running server: planning in a thread, execution as a participant, and the panel."""
+"""Programs on a running server: planning in a thread, execution as a participant, previews."""

@@ -1,4 +1,7 @@
-"""Preview of a program in the scene: the path of the tool, and the arm and objects along it."""
+"""Preview of a program in the scene: the path of the tool, and the arm and objects along it.
+
+The page chooses the time by the request `preview`.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import logging
 import threading
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,12 +26,15 @@ from katana450.errors import KatanaError
 from katana450.extensions.programs.building.actions import FollowPlan, UseTool
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Moment, Timeline, moments
+from katana450.extensions.programs.server.program_runner import ProgramRunner
+from katana450.extensions.programs.server.traces import DRIVEN
 from katana450.extensions.water import WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.water.flow import Water
 from katana450.maths.water.motion import MotionWithWater
+from katana450.server.view.panel_folder import FolderContext
 from katana450.server.view.scene import Colour, GhostNodes, Window
 from katana450.server.view.scene_objects import ObjectShape
 
@@ -134,8 +141,8 @@ def _amounts(poured: MotionWithWater | None) -> tuple[int, ...]:
 
 log = logging.getLogger(__name__)
 
-TIME_STEP = 0.1
-"""[s] Step of the slider that chooses a time of the preview, and resolution of shown durations."""
+NEWEST = 0.1
+"""[s] Age up to which the last simulated state is shown for a time after it."""
 
 COLOUR: Colour = (64, 156, 255)
 """Colour of the path."""
@@ -149,7 +156,7 @@ LOOK_OPACITY = 0.5
 """Opacity of the ghost at the slider's time."""
 
 
-class Preview:
+class PreviewNodes:
     """The path line, kept until the arm is driven after the run, and a ghost, kept until it runs.
 
     The ghost is sent when it is first shown. Objects and water are simulated in a thread, which
@@ -173,11 +180,11 @@ class Preview:
         self._ghost: GhostNodes | None = None
         self._ghost_scene: GhostScene | None = None
         self._shown: _Shown | None = None
-        # The slider's callback runs in a thread of viser.
+        # A time is shown in a thread of its own, see `ProgramPreview`.
         self._lock = threading.Lock()
 
-    def show(self, program: Program | None, state: State) -> float:
-        """Draw ``program``, which begins in ``state``; return its duration [s], 0 for nothing."""
+    def show(self, program: Program | None, state: State) -> None:
+        """Draw ``program``, which begins in ``state``; None draws nothing."""
         with self._lock:
             self._hide_ghost()
             self._shown = None
@@ -186,12 +193,9 @@ class Preview:
             if paths:
                 self._path_line.points = np.concatenate(paths).astype(np.float32)
             self._path_line.visible = bool(paths)
-            # A program that is continued in the middle of a motion has no preview by time.
-            timeline = None if program is None else Timeline.of(program)
-            if program is None or timeline is None or not timeline.pieces or program.first:
-                return 0.0
-            self._shown = _Shown(program, timeline, state)
-            return self._shown.timeline.span
+            timeline = None if program is None else Timeline.previewed(program)
+            if program is not None and timeline is not None:
+                self._shown = _Shown(program, timeline, state)
 
     def look(self, t: float) -> None:
         """Show arm, objects and water at the time ``t`` [s] of the preview; hide them at 0."""
@@ -299,7 +303,7 @@ class _Shown:
     def at(self, t: float) -> State | None:
         """Return the simulated state at ``t`` [s]; None if it is not known."""
         number = bisect_right(self.moments, t, key=lambda moment: moment.t)
-        if not 0 < number <= len(self.moments) or t > self.moments[-1].t + TIME_STEP:
+        if not 0 < number <= len(self.moments) or t > self.moments[-1].t + NEWEST:
             return None
         return self.moments[number - 1].state
 
@@ -325,3 +329,50 @@ def _tool_paths(arm: MountedArm, program: Program, tool: str) -> list[FloatArray
             paths.append(np.stack((points[:-1], points[1:]), axis=1))
         tools.update(dict.fromkeys(program.next(number), tool))
     return paths
+
+
+class ProgramPreview:
+    """The preview of the program that is planned: its path, and the time that the page chooses."""
+
+    def __init__(
+        self,
+        runner: ProgramRunner,
+        preview: PreviewNodes,
+        state: Callable[[], State],
+    ) -> None:
+        """Follow ``runner``, whose requests show a time; ``state`` returns the newest state."""
+        self._runner, self._preview, self._state = runner, preview, state
+        self._drawn: Program | None = None
+        self._begun = False
+        # Drawing a ghost for the first time takes longer than the server's thread may wait.
+        self._painter = ThreadPoolExecutor(1, "preview")
+        runner.show_preview = lambda: self._painter.submit(self._look)
+
+    def _look(self) -> None:
+        """Show the newest time; of several requests that waited, all show the last one."""
+        try:
+            self._preview.look(self._runner.look_time)
+        except Exception:
+            log.exception("The preview met an error.")
+
+    def follow(self) -> None:
+        """Draw a new program, and hide the preview once it runs or the arm is driven after it."""
+        program, has_begun = self._runner.program, self._runner.begun
+        if program is not self._drawn or (self._begun and not has_begun):
+            self._drawn = program
+            self._preview.show(program, self._state())
+        if has_begun and not self._begun:
+            self._preview.begin()
+        self._begun = has_begun
+        if has_begun and not self._runner.running and isinstance(self._state().mode, DRIVEN):
+            self._preview.end()
+
+
+def program_preview(context: FolderContext) -> ProgramPreview | None:
+    """Return the preview of the programs of a server; None for a robot without an arm."""
+    hub = context.hub
+    # Another extension may provide the only runner of this server.
+    if context.robot.arm is None or not isinstance(hub.runner, ProgramRunner):
+        return None
+    preview = PreviewNodes(context.server, context.robot, lambda: hub.present().session)
+    return ProgramPreview(hub.runner, preview, context.state)

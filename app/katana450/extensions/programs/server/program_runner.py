@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import logging
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import msgspec
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Request
 from katana450.arm.control.lease import Person
@@ -24,6 +24,7 @@ from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.continuation import Interruption
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.run.simulation import Timeline
 from katana450.extensions.programs.server import state_line
 from katana450.extensions.programs.server.program_participant import (
     FollowRun,
@@ -38,6 +39,7 @@ from katana450.extensions.programs.server.program_planner import (
     ProgramPlanner,
 )
 from katana450.extensions.programs.server.state_line import RunNews
+from katana450.extensions.programs.server.step_list import ListedStep, planned_steps, steps_of
 from katana450.server.api import answers
 from katana450.server.api import program_requests as requests
 from katana450.server.api.program_requests import ProgramOrder
@@ -50,11 +52,26 @@ from katana450.server.service.stop_state import LastPause
 log = logging.getLogger(__name__)
 
 
+class _Preview(NamedTuple):
+    """The preview of a planned program.
+
+    Attributes:
+        program: the program.
+        steps: its steps.
+        seconds: its duration [s]; 0 if it cannot be shown by time.
+        look: the time that is shown [s]; 0 for none.
+    """
+
+    program: Program
+    steps: tuple[ListedStep, ...]
+    seconds: float
+    look: float = 0.0
+
+
 class ProgramRunner(Runner):
     """The runner of at most one program at a time."""
 
     request_types = requests.REQUESTS
-    controls = ("Script", "Program", "Look at")
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
         """Prepare to run programs of ``hub``. ``options``: see ``extension.add_serve_options``."""
@@ -67,6 +84,9 @@ class ProgramRunner(Runner):
         self._is_news = False  # Whether no other command followed the end of a run or planning.
         self._runs_as: ProgramParticipant | None = None
         self._run: Run | None = None
+        self._preview: _Preview | None = None
+        self.show_preview: Callable[[], object] = lambda: None
+        """Called in the server's thread when ``look_time`` has changed by a request."""
         self.follow_run: FollowRun = lambda *_: None
         """Called with name and text of a script that begins or has ended, and these times [s]."""
 
@@ -81,6 +101,11 @@ class ProgramRunner(Runner):
         return self.planner.program
 
     @property
+    def begun(self) -> bool:
+        """True once the present program has begun to run, also after its end."""
+        return self._run is not None
+
+    @property
     def waits(self) -> bool:
         """True if the program runs as soon as it is planned."""
         return self.planner.then is not None
@@ -93,12 +118,6 @@ class ProgramRunner(Runner):
         """Return whether the program of ``participant`` runs, or will once it is planned."""
         return self.owns(participant) and (self.running or self.planner.will_run)
 
-    def check_may_touch(self, actor: Actor) -> None:
-        """Raise LeaseError if ``actor`` may not drive, or does not own the running program."""
-        check_may_drive(actor.person)
-        if self.running:
-            self._owner.check_may_steer(actor.person)
-
     def handle(self, participant: Participant, request: Request) -> answers.Answer:
         """Execute ``request``. Raises LeaseError or InputError."""
         match request:
@@ -109,6 +128,8 @@ class ProgramRunner(Runner):
                 return answers.Done(ticket=ticket, outcome=None if ticket else ACCEPTED)
             case requests.Breakpoints(steps=steps):
                 self.set_breakpoints(participant, steps)
+            case requests.Preview(at=t):
+                self._look_at(participant, t)
         return answers.Done()
 
     def script(self, participant: Participant, text: str, *, more: bool, speed: float) -> None:
@@ -274,6 +295,49 @@ class ProgramRunner(Runner):
             breakpoints=tuple(sorted(index + 1 for index in self.planner.breakpoints)),
             can_continue=not self.running and self.planner.may_continue(self._interruption),
         )
+
+    def plan(self) -> answers.ProgramPlan:
+        """Return the present or last program with its steps."""
+        program, progress = self.program, self.progress()
+        if program is None:
+            return answers.ProgramPlan(text=self.planner.text, program=progress)
+        preview, look = self._preview_of(program), self.look_time
+        return answers.ProgramPlan(
+            text=self.planner.text,
+            program=progress,
+            steps=planned_steps(preview.steps, progress, look),
+            seconds=0.0 if self.begun else preview.seconds,
+            look=look,
+        )
+
+    @property
+    def look_time(self) -> float:
+        """Time [s] of the preview that the scene shows; 0 for none, as while the program runs."""
+        preview = self._preview
+        shown = preview is not None and preview.program is self.program and not self.begun
+        return preview.look if preview is not None and shown else 0.0
+
+    def _preview_of(self, program: Program) -> _Preview:
+        """Return what is known of the preview of ``program``, which is planned."""
+        preview = self._preview
+        if preview is None or preview.program is not program:
+            timeline = Timeline.previewed(program)
+            seconds = 0.0 if timeline is None else timeline.span
+            preview = self._preview = _Preview(program, steps_of(program), seconds)
+        return preview
+
+    def _look_at(self, participant: Participant, t: float) -> None:
+        """Show the time ``t`` [s] of the preview. Raises LeaseError if there is none."""
+        check_may_drive(participant.person)
+        if self.running:
+            raise LeaseError("The program runs, and the arm itself shows it.")
+        program = self.planner.require().program
+        assert program is not None
+        preview = self._preview_of(program)
+        if preview.seconds <= 0.0 or self.begun:
+            raise LeaseError("There is no preview. Plan the program from its beginning first.")
+        self._preview = preview._replace(look=min(t, preview.seconds))
+        self.show_preview()
 
     def status_line(self, state: State, line: StatusLine, reader: Person | None) -> StatusLine:
         """Return the line for the program in place of ``line``."""

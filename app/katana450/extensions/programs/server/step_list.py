@@ -1,10 +1,8 @@
-"""The steps of a program as a list in the panel, each marked as done, current or next."""
+"""The steps of a program as a list, each marked as done, current or next."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Collection
-from html import escape
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -12,7 +10,7 @@ from katana450.extensions.programs.building.actions import expected_time
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.server.state_line import ENDED, RUNS
-from katana450.server.api.answers import Progress
+from katana450.server.api.answers import ProgramStep, Progress
 
 SHOWN = "shown"
 """Mark of the step at the time of the preview that is looked at."""
@@ -33,6 +31,17 @@ class ListedStep(NamedTuple):
     name: str
     seconds: float
     predicted: bool = True
+
+
+def planned_steps(
+    steps: tuple[ListedStep, ...], progress: Progress | None, look: float
+) -> tuple[ProgramStep, ...]:
+    """Return ``steps`` as the answer `program_plan` has them; see ``marks``."""
+    words = marks(steps, progress, look)
+    return tuple(
+        ProgramStep(name=step.name, seconds=step.seconds, mark=word)
+        for step, word in zip(steps, words, strict=True)
+    )
 
 
 def steps_of(program: Program) -> tuple[ListedStep, ...]:
@@ -80,35 +89,3 @@ def marks(steps: tuple[ListedStep, ...], progress: Progress | None, look: float)
             is_expected = steps[step].predicted or not steps[current].predicted
             words[step] = NEXT if is_expected else ""
     return tuple(words)
-
-
-def page(
-    steps: tuple[ListedStep, ...], words: tuple[str, ...], breakpoints: Collection[int] = ()
-) -> str:
-    """Return the list with the marks ``words`` as HTML; the empty string without steps.
-
-    Each step has a button to pause before it, pressed if it is one of the ``breakpoints``, which
-    are numbers from 1, and a button to run the program from it. static/scene/steps.js gives the
-    orders.
-    """
-    rows = "".join(
-        f"<li{_attributes(word)}>"
-        f"<button name=pause aria-label='Pause before step {number}' title='Pause before this "
-        f"step' aria-pressed={'true' if number in breakpoints else 'false'}></button>"
-        f"<button name=run aria-label='Run from step {number}' title='Run from this step'>"
-        f"</button><span>{escape(step.name)}</span>"
-        f"<span>{' '.join(filter(None, (word, _duration(step, word))))}</span></li>"
-        for number, (step, word) in enumerate(zip(steps, words, strict=True), 1)
-    )
-    return f"<div class='k450'><ol class='steps' tabindex=0>{rows}</ol></div>" if rows else ""
-
-
-def _attributes(word: str) -> str:
-    """Return the attributes of a row with the mark ``word``."""
-    if word in (SHOWN, NOW, ENDED_HERE):
-        return " aria-current=step"
-    return f" class={word}" if word else ""
-
-
-def _duration(step: ListedStep, word: str) -> str:
-    return f"{step.seconds:.1f} s" if step.seconds > 0.0 and word != SKIPPED else ""

@@ -1,0 +1,148 @@
+// The chosen object in the sheet of objects: its colour, scale and rotation, whether it is drawn, and what carries it.
+import { styled } from "../dom.js";
+import { button, html, set } from "../instruments/shape.js";
+import { readObjects } from "../server.js";
+
+const EVERY = 1000; // ms between two looks at the objects, which others change too
+const SEND_EVERY = 100; // ms between two values of a slider
+const HELD = 500; // ms after a change for which an older answer of the server is not shown
+const PLAIN = "#94a3b8"; // of an object without a colour of its own
+const DEGREES = 180 / Math.PI;
+/** @type {[string, Api.Attachment, string][]} */
+const MOUNTS = [
+  ["Hand", "hand", "It moves with the hand as a part of it"],
+  ["Table", "table", "It is set down on the table below"],
+  ["Here", "world", "It stays where it is, even in the air"],
+];
+
+/** Return the rotation of an object about the vertical [degrees]. @param {number[][]} T */
+const turnOf = (T) => Math.round(Math.atan2(T[1][0], T[0][0]) * DEGREES) + 0;
+
+/** Return the pose `T` turned by `angle` [degrees] about the vertical through it. @param {number[][]} T @param {number} angle */
+function turned(T, angle) {
+  const [c, s] = [Math.cos(angle / DEGREES), Math.sin(angle / DEGREES)];
+  const [x, y] = [0, 1].map((row) => T[row].slice(0, 3));
+  return [[...x.map((a, i) => c * a - s * y[i]), T[0][3]], [...x.map((a, i) => s * a + c * y[i]), T[1][3]], T[2], T[3]];
+}
+
+export class ObjectForm {
+  #say;
+  /** @type {Api.SceneObject[]} */
+  #objects = [];
+  #sender = 0;
+  #timer = 0;
+  #acted = -Infinity; // ms, time of the last change
+  #choice = html("select", { "aria-label": "Object" });
+  #remove = button("Remove", () => this.#act({ do: "remove", name: this.#name }));
+  #colour = this.#input("colour", { type: "color" }, (value) => ({ colour: value }));
+  #own = button("Own colour", () => this.#act({ do: "place", name: this.#name, colour: "own" }));
+  #opacity = this.#input("opacity", { type: "range", min: 5, max: 100, step: 1 }, (value) => ({ opacity: Number(value) / 100 }));
+  #scale = this.#input("scale", { type: "number", min: 0.001, max: 1000, step: "any", inputmode: "decimal" }, (value) => (value ? { scale: Number(value) } : {}));
+  #turn = this.#input("turn", { type: "range", min: -180, max: 180, step: 1 }, (value) => this.#turned(Number(value)));
+  #hidden = html("input", { type: "checkbox" });
+  #values = { opacity: html("output"), turn: html("output") };
+  element = html("fieldset", { id: "object", title: "" });
+
+  /** @param {Page.Say} say */
+  constructor(say) {
+    this.#say = say;
+    styled("object.css", import.meta.url);
+    /** @param {string} name @param {(Node | string)[]} content */
+    const row = (name, ...content) => html("label", {}, html("span", {}, name), ...content);
+    const mounts = MOUNTS.map(([label, to, title]) => button(label, () => this.#act({ do: "attach", name: this.#name, to }), { title }));
+    this.#hidden.addEventListener("change", () => this.#act({ do: "place", name: this.#name, hidden: this.#hidden.checked }));
+    this.#choice.addEventListener("change", () => this.#show(true));
+    this.element.append(
+      html("div", {}, this.#choice, this.#remove),
+      html("div", {}, row("Colour", this.#colour), this.#own),
+      row("Opacity", this.#opacity, this.#values.opacity),
+      row("Scale", this.#scale),
+      row("Turn", this.#turn, this.#values.turn),
+      row("Hidden", this.#hidden, html("small", {}, "not drawn; the arm still keeps clear of it")),
+      html("div", { role: "group", "aria-label": "Attach to" }, html("span", {}, "Attach to"), ...mounts),
+    );
+    window.addEventListener("selected", (event) => {
+      const name = /** @type {CustomEvent<string>} */ (event).detail;
+      if (this.#objects.some((object) => object.name === name)) this.#choice.value = name;
+      this.#show(true);
+    });
+  }
+
+  get #name() {
+    return this.#choice.value;
+  }
+
+  get #object() {
+    return this.#objects.find(({ name }) => name === this.#name);
+  }
+
+  /** Look at the objects from now on, or no longer. @param {boolean} on */
+  watch(on) {
+    clearInterval(this.#timer);
+    if (!on) return;
+    this.#timer = setInterval(() => this.#read(), EVERY);
+    this.#read();
+  }
+
+  // A control that changes the object when it is used.
+  /** @param {string} name @param {import("../instruments/shape.js").Attributes} attributes @param {(value: string) => Partial<Api.Place>} change */
+  #input(name, attributes, change) {
+    const input = html("input", { name, ...attributes });
+    const send = () => {
+      this.#sender = 0;
+      this.#act({ do: "place", name: this.#name, ...change(input.value) });
+    };
+    input.addEventListener(input.type === "number" ? "change" : "input", () => {
+      this.#write();
+      if (!this.#sender) this.#sender = setTimeout(send, SEND_EVERY);
+    });
+    return input;
+  }
+
+  /** @param {number} angle @returns {Partial<Api.Place>} */
+  #turned(angle) {
+    const T = this.#object?.T;
+    return T ? { T: turned(T, angle - Math.atan2(T[1][0], T[0][0]) * DEGREES) } : {};
+  }
+
+  /** @param {Api.Act} request */
+  #act(request) {
+    this.#say(request);
+    this.#acted = performance.now();
+    setTimeout(() => this.#read(), HELD);
+  }
+
+  async #read() {
+    const before = this.#objects;
+    this.#objects = await readObjects();
+    const names = this.#objects.map(({ name }) => name);
+    const added = before.length ? names.find((name) => !before.some((object) => object.name === name)) : undefined;
+    if (names.join("\n") !== before.map(({ name }) => name).join("\n")) {
+      const chosen = this.#name;
+      this.#choice.replaceChildren(...names.map((name) => new Option(name)));
+      this.#choice.value = added ?? (names.includes(chosen) ? chosen : names[0] ?? "");
+    }
+    this.#show(this.#name !== before.find(({ name }) => name === this.#name)?.name);
+  }
+
+  // Show the chosen object; one that a person is changing only with `again`.
+  #show(again = false) {
+    const object = this.#object;
+    this.element.hidden = !object;
+    if (!object || (!again && (this.#sender || performance.now() - this.#acted < HELD || this.element.matches(":active")))) return;
+    const { colour, opacity, scale, hidden, T, held } = object;
+    this.#colour.value = colour ?? PLAIN;
+    this.#opacity.value = String(Math.round(100 * opacity));
+    if (this.#scale !== document.activeElement || again) this.#scale.value = String(scale);
+    this.#turn.value = String(turnOf(T));
+    this.#hidden.checked = hidden;
+    this.element.disabled = held;
+    set(this.element, "title", held ? "It is held: open the gripper first" : "");
+    this.#write();
+  }
+
+  #write() {
+    this.#values.opacity.value = `${this.#opacity.value} %`;
+    this.#values.turn.value = `${this.#turn.value}°`;
+  }
+}
