@@ -22,6 +22,7 @@ export class Player {
   #display;
   #plan;
   #run;
+  #planning = Promise.resolve(); // the last preview
 
   // id: of the requests.
   /**
@@ -51,8 +52,12 @@ export class Player {
     const { revocations } = this.#page.store.status ?? {};
     try {
       if (order && this.#plan.isShown && this.#plan.used) return await this.#run.steer(order, revocations);
+      // Run soon after Preview: the plan is finished first, and kept.
+      await this.#planning;
       if (this.#run.busy) throw new Error("It is running. End it in the bar first.");
-      await this.#play(order, revocations);
+      const playing = this.#play(order, revocations);
+      if (!order) this.#planning = playing.catch(() => {});
+      await playing;
     } catch (error) {
       report(messageOf(error), true);
     } finally {

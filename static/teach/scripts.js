@@ -1,5 +1,5 @@
 // Scripts in files: those of the server's folder, and those of the person.
-import { save, write } from "../dom.js";
+import { save } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { messageOf, request } from "../server.js";
 
@@ -17,7 +17,7 @@ const NEW = ".new"; // value of the option; no script has such a name
 export class Scripts {
   #sheet;
   open = html("select", { "aria-label": "Program" });
-  #shown = new Option("", "");
+  shown = new Option("", ""); // the program that the sheet shows
   #file = html("input", { type: "file", accept: ".yaml,.yml", "aria-label": "File of a script", hidden: "" });
   #keep = button("Save", () => this.#save(), { hidden: "", title: "Save in the folder of the server" });
   controls = [button("Download", () => this.#download()), this.#keep, this.#file];
@@ -36,13 +36,8 @@ export class Scripts {
     /** @type {{ names: string[], saves: boolean }} */
     const { names, saves } = await answer.json();
     this.#keep.hidden = !saves;
-    this.open.replaceChildren(this.#shown, new Option("New poses", NEW), new Option("A file …", FILE), ...names.map((name) => new Option(name)));
+    this.open.replaceChildren(this.shown, new Option("New poses", NEW), new Option("A file …", FILE), ...names.map((name) => new Option(name)));
     this.open.value = "";
-  }
-
-  /** Show the name of the program that the sheet shows. @param {string} name */
-  show(name) {
-    write(this.#shown, name);
   }
 
   // Show the script that was chosen, of the library or of the folder of the server.

@@ -346,7 +346,7 @@ export class Teach {
     this.#add.hidden = this.#view !== "poses";
     // A pose may be several steps, and Go moves to one of them.
     this.#step.hidden = this.#view === "poses";
-    this.#scripts.show(name);
+    write(this.#scripts.shown, name);
     this.#plan.draw();
     this.#drawPlan();
     this.#times.disabled = isText;
