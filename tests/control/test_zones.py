@@ -115,7 +115,7 @@ def passage(session: Session, command: cmd.Command) -> None:
     for passed in inside:
         (finding,) = passed.findings
         assert finding.reason is Reason.SLOW_ZONE
-        assert (finding.parts or ())[1] == "people"
+        assert (finding.parts or ("", ""))[1] == "people"
         assert passed.status is Status.OK
     assert max(speed_of(session, passed) for passed in ticks) > 1.2 * SLOW_SPEED
     assert ticks[-1].findings == ()

@@ -28,7 +28,7 @@ from katana450.extensions.robot_choice.uploaded_robots import (
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from tests.browser.server import SIMULATION_APP, AppServer
-from tests.exchange.test_several_files import zipped
+from tests.exchange.shape_bytes import zipped
 from tests.gateway.client import ask, enter, opened
 from tests.waiting import until
 

@@ -12,7 +12,8 @@ from msgspec import structs
 from katana450.client import Client, RefusedError
 from katana450.extensions.export.vrml.vrml_world import HEADER
 from katana450.server.api import requests
-from tests.exchange.test_several_files import ARTICULATED, PARTS, zipped
+from tests.exchange.shape_bytes import zipped
+from tests.exchange.test_several_files import ARTICULATED, PARTS
 from tests.gateway.virtual import VirtualServer
 
 

@@ -11,7 +11,7 @@ from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
-from katana450.extensions.programs.run.compiler import MAX_COPIES, Compiler
+from katana450.extensions.programs.run.compiler import MAX_COPIES, Compiler, ConditionalJump
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.run.simulation import Timeline, moments
@@ -131,7 +131,9 @@ def test_step_after_the_same_end_is_planned_once(stage: Stage, empty: State) -> 
     shorter = seconds[0] + seconds[1] + seconds[5]
     assert then.duration == pytest.approx(shorter) == Timeline.of(then).span
     # A run that takes another alternative counts that one as soon as it has chosen.
-    chosen = Run(0.0, number=program.tasks[1].action.then)
+    choice = program.tasks[1].action
+    assert isinstance(choice, ConditionalJump)
+    chosen = Run(0.0, number=choice.then)
     assert runner.seconds_left(program, chosen, full) == pytest.approx(shorter)
     run, states = stage.play(program, full)
     assert run.phase is Phase.DONE

@@ -298,7 +298,6 @@ def test_they_are_served_with_their_grippers(tmp_path: Path, joints: list[J]) ->
             closed, opened, _ = arm.gripper
             assert arm.gripper_slides == (opened < 0.1)
             state = next(iter(client.states()))
-            assert not arm.touch
             assert state.touch is None
             assert closed <= state.gripper <= opened
             assert client.go(requests.Gripper(angle=opened)).gripper == opened
