@@ -9,7 +9,7 @@ const UNREACHABLE = "The server does not answer. Try again.";
 const byId = (id) => element(id, HTMLElement);
 /** @type {Page.Say} */
 let say = () => {};
-const [unit, scaleBox] = [element("unit", HTMLSelectElement), element("fit-scale", HTMLInputElement)];
+const unit = element("unit", HTMLSelectElement);
 /** @type {File | null} */
 let file = null; // the last file that was chosen
 let main = ""; // the file to read in it, if it is a .zip file of several
@@ -18,8 +18,6 @@ let placed = null; // the name of its object
 let fitted = false; // whether its scale was chosen to fit
 /** @type {[number, number] | null} */
 let where = null; // [x, y] of the point of the table on which the files were dropped
-/** @type {Api.Mesh | null} */
-let waiting = null; // an answer whose object is placed when its scale is chosen
 const files = () => import("./objects/files.js");
 
 /** @param {string} words */
@@ -52,7 +50,6 @@ async function ask(path, body) {
 /** Read the file and place its object; `again`: the unit of an object that is placed has changed. @param {boolean} again */
 async function add(again) {
   if (!file) return;
-  byId("fit").hidden = true;
   offer([]);
   report(`Reading ${file.name} …`);
   const query = new URLSearchParams({ name: file.name });
@@ -63,17 +60,11 @@ async function add(again) {
   if (!mesh) return;
   // A changed unit applies to the object that is already placed.
   mesh.name = again && placed ? placed : mesh.name;
-  report(`${mesh.name}: ${mesh.text}`);
-  if (mesh.scale === 1) {
-    // A unit that fits replaces a scale that was chosen to fit, but not one that was set for the object.
-    place(mesh, fitted ? 1 : undefined);
-    fitted = false;
-    return;
-  }
-  waiting = mesh;
-  scaleBox.value = String(mesh.scale);
-  byId("fit").hidden = false;
-  resize();
+  const fits = mesh.scale === 1;
+  report(`${mesh.name}: ${fits ? "" : `placed at the scale ${mesh.scale}, which you can change below. `}${mesh.text}`);
+  // A unit that fits replaces a scale that was chosen to fit, but not one that was set for the object.
+  place(mesh, fits && !fitted ? undefined : mesh.scale);
+  fitted = !fits;
 }
 
 /** @param {Api.Mesh} mesh @param {number} [scale] */
@@ -81,21 +72,6 @@ function place(mesh, scale) {
   placed = mesh.name;
   window.dispatchEvent(new Event("placed"));
   say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key, ...(where && { near: where }), ...(scale && { scale }) });
-}
-
-/** @param {number} metres */
-const millimetres = (metres) => String(Number((1e3 * metres).toPrecision(3)));
-
-// Show the size that the typed scale gives.
-function resize() {
-  if (!waiting) return;
-  const scale = Number(scaleBox.value);
-  const sides = waiting.size.map((side) => scale * side);
-  const longest = Math.max(...sides);
-  const fits = longest >= 1e-3 && longest <= 2 && scale >= 1e-3 && scale <= 1e3;
-  byId("fit-size").textContent = fits || longest > 0 ? `${sides.map(millimetres).join(" × ")} mm` : "";
-  byId("fit-size").classList.toggle("bad", !fits);
-  element("fit-place", HTMLButtonElement).disabled = !fits;
 }
 
 /** Offer the files of a .zip file, one of which is to be read. @param {string[]} choices */
@@ -145,16 +121,6 @@ export function begin(page) {
   unit.addEventListener("change", () => add(true));
   byId("add-folder").addEventListener("click", () => byId("object-folder").click());
   byId("add-folder").hidden = !("webkitdirectory" in byId("object-folder")) || matchMedia("(pointer: coarse)").matches;
-  scaleBox.addEventListener("input", resize);
-  byId("fit").addEventListener("submit", (event) => {
-    event.preventDefault();
-    if (!waiting) return;
-    const scale = Number(scaleBox.value);
-    byId("fit").hidden = true;
-    fitted = true;
-    place(waiting, scale);
-    report(`${waiting.name}: placed at the scale ${scale}, ${byId("fit-size").textContent}.`);
-  });
   onChoice("object-file", take);
   onChoice("object-folder", take);
   onChoice("scene-file", ([first]) => load(first));

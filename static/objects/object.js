@@ -1,5 +1,5 @@
-// The chosen object in the sheet of objects: its colour, scale and rotation, whether it is drawn, and what carries it.
-import { styled } from "../dom.js";
+// The chosen object in the sheet of objects: its looks, size and rotation, what carries it, and the rule for the arm in a zone.
+import { onClick, styled } from "../dom.js";
 import { button, html, set } from "../instruments/shape.js";
 import { readObjects } from "../server.js";
 
@@ -14,6 +14,10 @@ const MOUNTS = [
   ["Table", "table", "It is set down on the table below"],
   ["Here", "world", "It stays where it is, even in the air"],
 ];
+
+/** @type {[string, Api.Zone][]} */
+const ZONES = [["None: it is a body", "none"], ["The arm keeps out", "keep_out"], ["The arm is slow", "slow"]];
+const NEW_ZONE = [0.2, 0.2, 0.2]; // m
 
 /** Return the rotation of an object about the vertical [degrees]. @param {number[][]} T */
 const turnOf = (T) => Math.round(Math.atan2(T[1][0], T[0][0]) * DEGREES) + 0;
@@ -38,10 +42,12 @@ export class ObjectForm {
   #own = button("Own colour", () => this.#act({ do: "place", name: this.#name, colour: "own" }));
   #opacity = this.#input("opacity", { type: "range", min: 5, max: 100, step: 1 }, (value) => ({ opacity: Number(value) / 100 }));
   #scale = this.#input("scale", { type: "number", min: 0.001, max: 1000, step: "any", inputmode: "decimal" }, (value) => (value ? { scale: Number(value) } : {}));
+  #size = this.#input("size", { type: "text" }, (value) => ({ size: this.#sizeOf(value) }));
+  #zone = html("select", {}, ...ZONES.map(([label, zone]) => new Option(label, zone)));
   #turn = this.#input("turn", { type: "range", min: -180, max: 180, step: 1 }, (value) => this.#turned(Number(value)));
   #hidden = html("input", { type: "checkbox" });
   #values = { opacity: html("output"), turn: html("output") };
-  element = html("fieldset", { id: "object", title: "" });
+  element = html("fieldset", { id: "object", "aria-label": "Chosen object", title: "" });
 
   /** @param {Page.Say} say */
   constructor(say) {
@@ -52,12 +58,16 @@ export class ObjectForm {
     const mounts = MOUNTS.map(([label, to, title]) => button(label, () => this.#act({ do: "attach", name: this.#name, to }), { title }));
     this.#hidden.addEventListener("change", () => this.#act({ do: "place", name: this.#name, hidden: this.#hidden.checked }));
     this.#choice.addEventListener("change", () => this.#show(true));
+    this.#zone.addEventListener("change", () => this.#act({ do: "place", name: this.#name, zone: /** @type {Api.Zone} */ (this.#zone.value) }));
+    onClick("add-zone", () => this.#addZone());
     this.element.append(
       html("div", {}, this.#choice, this.#remove),
       html("div", {}, row("Colour", this.#colour), this.#own),
       row("Opacity", this.#opacity, this.#values.opacity),
+      row("Size, mm", this.#size),
       row("Scale", this.#scale),
       row("Turn", this.#turn, this.#values.turn),
+      row("Zone", this.#zone),
       row("Hidden", this.#hidden, html("small", {}, "not drawn; the arm still keeps clear of it")),
       html("div", { role: "group", "aria-label": "Attach to" }, html("span", {}, "Attach to"), ...mounts),
     );
@@ -92,11 +102,23 @@ export class ObjectForm {
       this.#sender = 0;
       this.#act({ do: "place", name: this.#name, ...change(input.value) });
     };
-    input.addEventListener(input.type === "number" ? "change" : "input", () => {
+    input.addEventListener(input.type === "number" || input.type === "text" ? "change" : "input", () => {
       this.#write();
       if (!this.#sender) this.#sender = setTimeout(send, SEND_EVERY);
     });
     return input;
+  }
+
+  /** Return the lengths [m] in a text, at the scale 1. @param {string} text */
+  #sizeOf(text) {
+    const sides = text.split(/[×x;\s]+/).filter(Boolean);
+    return sides.map((side) => Number(side.replace(",", ".")) / 1e3 / (this.#object?.scale ?? 1));
+  }
+
+  #addZone() {
+    let number = 1;
+    while (this.#objects.some(({ name }) => name === `zone ${number}`)) number += 1;
+    this.#act({ do: "place", name: `zone ${number}`, shape: "box", size: NEW_ZONE, zone: "keep_out" });
   }
 
   /** @param {number} angle @returns {Partial<Api.Place>} */
@@ -130,10 +152,14 @@ export class ObjectForm {
     const object = this.#object;
     this.element.hidden = !object;
     if (!object || (!again && (this.#sender || performance.now() - this.#acted < HELD || this.element.matches(":active")))) return;
-    const { colour, opacity, scale, hidden, T, held } = object;
+    const { colour, opacity, size, scale, hidden, T, held, zone } = object;
     this.#colour.value = colour ?? PLAIN;
     this.#opacity.value = String(Math.round(100 * opacity));
     if (this.#scale !== document.activeElement || again) this.#scale.value = String(scale);
+    const sides = size.map((side) => Number((1e3 * scale * side).toPrecision(6)));
+    if (this.#size !== document.activeElement || again) this.#size.value = sides.join(" × ");
+    this.#size.readOnly = object.shape === "mesh";
+    this.#zone.value = zone ?? "none";
     this.#turn.value = String(turnOf(T));
     this.#hidden.checked = hidden;
     this.element.disabled = held;

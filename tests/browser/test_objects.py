@@ -215,6 +215,25 @@ def test_chosen_object_is_edited_in_the_sheet(page: ViserPage, reader: Client) -
     page.wait_until(lambda: objects(reader).keys() == before, "it to go")
 
 
+def test_zone_is_added_in_the_sheet(page: ViserPage, reader: Client, artefacts: Path) -> None:
+    page.press_in_bar("Objects")
+    page.page.get_by_role("button", name="Add zone").click()
+    page.wait_until(lambda: "zone 1" in objects(reader), "the zone")
+    form = page.page.locator("#object")
+    page.wait_until(lambda: form.get_by_label("Zone").input_value() == "keep_out", "its row")
+    size = form.get_by_label("Size, mm")
+    assert size.input_value() == "200 × 200 × 200"
+    size.fill("20 400,5 x 500")
+    size.press("Enter")
+    page.wait_until(lambda: objects(reader)["zone 1"].size == [0.02, 0.4005, 0.5], "the size")
+    form.get_by_label("Zone").select_option("The arm is slow")
+    page.wait_until(lambda: objects(reader)["zone 1"].zone == "slow", "the rule")
+    page.keep(artefacts / "zone.png")
+    form.get_by_role("button", name="Remove", exact=True).click()
+    page.wait_until(lambda: "zone 1" not in objects(reader), "it to go")
+    page.press_in_bar("Objects")
+
+
 @pytest.mark.long
 def test_clicked_object_gets_arrows_that_move_it_in_this_window_alone(
     page: ViserPage, reader: Client, server: AppServer, open_page: OpenPage, artefacts: Path
@@ -303,23 +322,19 @@ def test_a_large_object_is_placed_with_a_scale(
     page: ViserPage, reader: Client, artefacts: Path
 ) -> None:
     drop(page, house_glb=cube(5.0, "glb"))
-    form = page.page.locator("#fit")
-    form.wait_for()
-    assert "5000 mm long, over 2000 mm: place it with the scale 0.2" in shown(page)
-    assert page.page.input_value("#fit-scale") == "0.2"
-    assert page.page.inner_text("#fit-size") == "1000 × 1000 × 1000 mm"
-    assert "house" not in objects(reader)
-    page.page.fill("#fit-scale", "0.9")
-    assert page.page.inner_text("#fit-size") == "4500 × 4500 × 4500 mm"
-    assert page.page.locator("#fit-place").is_disabled()
-    page.page.fill("#fit-scale", "0.03")
-    assert page.page.inner_text("#fit-size") == "150 × 150 × 150 mm"
+    page.wait_until(lambda: "house" in objects(reader), "the object")
+    page.wait_until(lambda: "placed at the scale 0.2" in shown(page), "the answer")
+    assert "5000 mm long, over 2000 mm" in shown(page)
+    form = page.page.locator("#object")
+    page.wait_until(lambda: form.get_by_label("Scale").input_value() == "0.2", "its scale")
+    assert form.get_by_label("Size, mm").input_value() == "1000 × 1000 × 1000"
+    form.get_by_label("Scale").fill("0.9")
+    form.get_by_label("Scale").press("Enter")
+    page.wait_until(lambda: "must be from 0.001 to 2 m" in bar(page, "toast"), "the refusal")
+    form.get_by_label("Scale").fill("0.03")
+    form.get_by_label("Scale").press("Enter")
+    page.wait_until(lambda: objects(reader)["house"].scale == 0.03, "the other scale")
     page.screenshot(artefacts / "app-scale.png")
-    page.page.click("#fit-place")
-    page.wait_until(
-        lambda: "house" in objects(reader) and objects(reader)["house"].scale == 0.03, "the object"
-    )
-    assert not form.is_visible()
     # A unit that fits replaces the scale.
     page.page.select_option("#unit", "cm")
     page.wait_until(

@@ -43,10 +43,11 @@ def test_times_are_those_of_the_browser_and_oneself_is_you(browser: Browser) -> 
 
 def test_comma_of_a_typed_number_is_its_point(page: Page) -> None:
     load(page, "Keys", "page/keys.js")
-    page.evaluate("() => document.body.append(document.querySelector('#fit-scale'))")
-    scale = page.locator("#fit-scale")
-    scale.press_sequentially("12,5")
-    assert scale.input_value() == "12.5"
+    page.evaluate("""() => document.body.append(
+        Object.assign(document.createElement("input"), { type: "number", id: "length" }))""")
+    length = page.locator("#length")
+    length.press_sequentially("12,5")
+    assert length.input_value() == "12.5"
 
 
 # First frame
