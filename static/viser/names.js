@@ -15,8 +15,9 @@ export const HINT = "[role=tooltip]";
 export const SOFTWARE_NOTICE = ".mantine-Notification-root[style*=orange]";
 // viser draws faintly until the light of the room is loaded. If drawing takes as long as that, viser
 // miscounts and the picture stays faint. It also starts with the light theme. Without controls from
-// the server, as before each connection, its panel shows settings for developers.
+// the server, as before each connection, its panel shows settings for developers. Its ground is that of the page.
 export const STEADY = `canvas { opacity: 1 !important }
+    :root { --mantine-color-body: light-dark(#fff, #1d232a) !important }
     html[data-theme=dark]:not([data-mantine-color-scheme=dark]) #root { opacity: 0 }
     html[data-loading] .mantine-Stack-root:has(> .mantine-TextInput-root) { visibility: hidden }`;
 // Without transitions while nothing is drawn.
