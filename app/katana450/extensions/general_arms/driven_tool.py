@@ -325,7 +325,8 @@ class DrivenTool(ToolKinematics):
         a, d = links.a, [*links.d, 0.0]
         # An offset along an axis does not move the tool away from it.
         lengths = [
-            sum(map(math.hypot, a[k:], [0.0, *d[k + 1 : len(a)]])) + tool for k in range(links.n)
+            math.fsum(map(math.hypot, a[k:], [0.0, *d[k + 1 : len(a)]])) + tool
+            for k in range(links.n)
         ]
         # A joint that slides moves the tool as fast as itself.
         return np.where(self.chain.slides, 1.0, lengths)

@@ -89,7 +89,7 @@ class DHLinks:
     def reach(self) -> float:
         """An upper bound [m] on the distance of the tool point from axis 1's frame."""
         tool = float(np.linalg.norm(self.T_n_tool[:3, 3]))
-        return sum(self.a) + sum(map(abs, self.d)) + tool
+        return math.fsum(self.a) + math.fsum(map(abs, self.d)) + tool
 
     def is_parallel(self, i: int) -> bool:
         """Return whether axes i and i + 1 (from 1) are parallel or opposite."""

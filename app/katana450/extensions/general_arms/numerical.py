@@ -278,7 +278,7 @@ class Numerical(Kinematics):
             *((b - a) * scale for a, b in zip(pose[9:], goal[9:], strict=True)),
         )
         J = [[w1, w2, w3, v1 * scale, v2 * scale, v3 * scale] for w1, w2, w3, v1, v2, v3 in moved]
-        return SearchState(error, sum(e * e for e in error), J)
+        return SearchState(error, math.fsum(e * e for e in error), J)
 
     def descend(
         self, goal: tuple[float, ...], start: Sequence[float], steps: int

@@ -131,7 +131,7 @@ class Chain:
                 weights = away[::-1] if away.any() else np.ones(2)
                 points[i] = points[i] + axes[i] * float(along @ weights / weights.sum())
         travel = np.maximum(np.abs(self.lower), np.abs(self.upper)) @ self.slides
-        return sum(map(math.dist, points, points[1:])) + float(travel)
+        return math.fsum(map(math.dist, points, points[1:])) + float(travel)
 
     def with_tool(self, M: npt.ArrayLike) -> Chain:
         """Return the same arm with another tool: `M` (4, 4) is the tool's pose in {S} at q = 0."""

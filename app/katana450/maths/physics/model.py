@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -227,7 +228,7 @@ class _Builder:
         for T, shape, size in zip(body.T_body_shape, body.shapes, volumes, strict=True):
             friction = body.friction, SPIN_FRICTION
             geom = self._add(frame, T, shape, friction, (BODY, LINK | BODY), solid=True)
-            geom.mass = body.mass * size / sum(volumes)
+            geom.mass = body.mass * size / math.fsum(volumes)
             self._owners.append(body.name)
 
     def _add(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -119,12 +120,12 @@ class Plan:
 
     def duration_at(self, fraction: float) -> float:
         """Return the duration [s] at ``fraction`` of full speed, with rest between segments."""
-        return sum(segment.scaling.duration_at(fraction) for segment in self.segments)
+        return math.fsum(segment.scaling.duration_at(fraction) for segment in self.segments)
 
     @property
     def length(self) -> float:
         """The length of the tool point's path [m]."""
-        return sum(segment.length for segment in self.segments)
+        return math.fsum(segment.length for segment in self.segments)
 
     @cached_property
     def start(self) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from katana450.arm.control.objects.environment import Environment, Hand
@@ -62,7 +63,7 @@ def contacts_of(state: State) -> tuple[FingerContact, ...]:
 def side_forces(hand: Hand, contacts: tuple[FingerContact, ...], name: str) -> list[float]:
     """Return the normal force of each gripping side of ``hand`` on the object ``name`` [N]."""
     return [
-        sum(
+        math.fsum(
             contact.force for contact in contacts if contact.body == name and contact.finger in side
         )
         for side in hand.gripping_sides
@@ -81,7 +82,7 @@ def _holding(environment: Environment, hand: Hand, before: State, state: State, 
     if state.bodies is None or gripper.is_wider(state.gripper_goal, free):
         return state
     last = named(before.objects, held.name)
-    load = sum(contact.friction for contact in contacts_of(before))
+    load = math.fsum(contact.friction for contact in contacts_of(before))
     reason = None
     if max(side_forces(hand, state.bodies.contacts, held.name)) == 0.0:
         if before.grip is None or not contacts_of(before):

@@ -107,7 +107,7 @@ class Grasping(NamedTuple):
             radius = max(shape.radius for shape in parts[name].shapes)
             reach = max(reach, float(np.linalg.norm(one[name] - point)) + 2.0 * radius)
         tips = [max(speeds[name] for name in side) for side in hand.sides if side]
-        force_limit = FINGER_FORCE * sum(tips)
+        force_limit = FINGER_FORCE * math.fsum(tips)
         stiffness = force_limit * max(tips) / FULL_FORCE_WAY
         drive = FingerDrive(variable, stiffness, force_limit, hand.palm, point)
         return Grasping(drive, reach)
@@ -265,7 +265,7 @@ class LooseObjects:
         if vessel is not None and vessel.mass > 0.0:
             mass = vessel.mass
         else:
-            mass = DENSITY * sum(map(volume, self._pieces(scene_object)[0]))
+            mass = DENSITY * math.fsum(map(volume, self._pieces(scene_object)[0]))
         water = None if state.poured is None else state.poured.water.vessel(scene_object.name)
         if water is None:
             return mass
