@@ -78,6 +78,6 @@ def test_recording_is_verified_and_scored(name: str, tmp_path: Path) -> None:
     recording = katana450.open(recorded)
     assert recording.verify(urdf).identical
     score = recording.score(targets={"box": np.array((0.16, -0.12, 0.0))}, urdf=urdf)
-    # The file of the SO-101 rounds its angles.
-    error = 1e-6 if name == "SO-101" else 1e-9
+    # Contacts give way a little, and the single jaw of an SO-101 turns as it lets go.
+    error = 2e-3 if name == "SO-101" else 1e-4
     np.testing.assert_allclose(score.places["box"], (0.16, -0.12, 0.0), atol=error)
