@@ -160,7 +160,7 @@ class LooseObjects:
         motion = simulation.begin(poses, motion, moved, woken)
         if dt <= 0.0:
             return replace(state, bodies=motion)
-        grasp = self._grasp(before, state, motion)
+        grasp = self._grasp(before, state, motion, simulation.finger_joint(motion))
         rates = np.append(before.motion.qd, 0.0), np.append(state.motion.qd, 0.0)
         motion = simulation.step(motion, start, end, dt, rates, grasp)
         fingers, goal = simulation.finger_joint(motion), state.gripper_goal
@@ -175,10 +175,13 @@ class LooseObjects:
         idle = motion.resting.all() and not motion.contacts
         return replace(state, objects=self._shown(state, motion), bodies=None if idle else motion)
 
-    def _grasp(self, before: State, state: State, motion: BodyMotion) -> float | None:
+    def _grasp(
+        self, before: State, state: State, motion: BodyMotion, fingers: float | None
+    ) -> float | None:
         """Return the goal of the drive of fingers that touch something [rad or m].
 
         Fingers that open, or touch nothing, move as the setpoint does: then it is None.
+        ``fingers`` are where they are; None at the setpoint, which faster fingers lag behind.
         """
         hand = self._environment.hand
         if hand is None or not motion.contacts:
@@ -188,7 +191,8 @@ class LooseObjects:
             return None
         if grip is not None:
             return gripper.wider(grip, -state.squeeze)
-        is_closing = gripper.is_wider(setpoint, state.gripper_goal)
+        place = setpoint if fingers is None else fingers
+        is_closing = gripper.is_wider(place, state.gripper_goal)
         waits = state.stopped is not None or state.paused
         return state.gripper_goal if is_closing and not waits else None
 

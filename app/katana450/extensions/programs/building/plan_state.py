@@ -296,9 +296,10 @@ class PlanState:
         A program runs only after a stop was cleared and a pause ended, but may be planned before.
         """
         q, branch = frozen(q), self.plan_context.arm.kinematics.branch_of(q)
+        # What is held goes along, so its last motion is no longer true.
         standing = replace(
             self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE,
-            stopped=None, paused=False, blocked=False,
+            stopped=None, paused=False, blocked=False, bodies=None,
         )  # fmt: skip
         return replace(self, state=standing).with_still_water()
 
