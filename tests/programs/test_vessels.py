@@ -81,7 +81,7 @@ def test_half_of_the_cup_is_poured_into_a_glass_and_all_into_the_basin(stage: St
     margins = [stage.session.pouring.margin_to_rim(s.poured, s.objects) for s in full if s.poured]
     assert min(margins[:-50]) > 0.0
     (poured,) = (vessel for vessel in states[-1].objects if vessel.name == "glass")
-    np.testing.assert_allclose(poured.T[:3, 3], (0.42, 0.04, 0.0), atol=1e-6)
+    np.testing.assert_allclose(poured.T[:3, 3], (0.42, 0.04, 0.0), atol=1e-3)
 
 
 @pytest.mark.cases(1)
