@@ -1,4 +1,4 @@
-"""An hour of motion without a pause takes at most 60 MB."""
+"""An hour of motion without a pause takes at most 62 MB."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ TICKS = 6000 if LONG else 660
         pytest.param(random_commands, 2, marks=pytest.mark.long),
     ],
 )
-def test_hour_without_a_pause_takes_at_most_60_mb(
+def test_hour_without_a_pause_takes_at_most_62_mb(
     tmp_path: Path, commands: Commands, seed: int
 ) -> None:
     path = tmp_path / "hour.mcap"
@@ -52,4 +52,4 @@ def test_hour_without_a_pause_takes_at_most_60_mb(
     # Beginning and end of a file; a server begins another one each minute.
     fixed = sizes[0] + path.stat().st_size - sizes[-1]
     minutes = PERIOD * 60 * (len(sizes) - 1) / 60.0
-    assert 60.0 * ((sizes[-1] - sizes[0]) / minutes + fixed) < 60e6
+    assert 60.0 * ((sizes[-1] - sizes[0]) / minutes + fixed) < 62e6
