@@ -12,11 +12,14 @@ from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan, Task
+from katana450.extensions.programs.building.plan_state import PlanState
+from katana450.extensions.programs.language.places import Spot
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.steps.place import Pick, PlaceHeld
 from katana450.maths.geometry import se3, so3
 from katana450.maths.planning.plan import MARGIN
 from tests.programs.conftest import TICK, Stage
@@ -80,6 +83,19 @@ def test_stacked_object_is_grasped_so_that_it_can_be_placed(stage: Stage) -> Non
     with pytest.raises(ScriptError, match=r"b cannot be placed there: .* a pitch of 90"):
         planned(stage, "- stack: {object: b, on: a, side: above}\n", *objects)
     planned(stage, "- stack: {object: b, on: a}\n", *objects)
+
+
+def test_plan_knows_where_it_puts_an_object(stage: Stage) -> None:
+    """A later step stacks another object there."""
+    plan = PlanState(
+        stage.plan_context, replace(stage.begin(), objects=(box("b", NEAR),), poured=None)
+    )
+    (b,) = (
+        PlaceHeld(Spot(*(1e-3 * length for length in AT)), in_base=True)
+        .build(Pick("b").build(plan))
+        .state.objects
+    )
+    assert place(b) == pytest.approx([*AT, 0.0], abs=0.2)
 
 
 def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
