@@ -23,18 +23,25 @@ Mask = npt.NDArray[np.bool_]
 
 
 def placed(path: Path, joints: Mapping[str, float]) -> list[tuple[str, trimesh.Trimesh]]:
-    """Return link and mesh of every visual in the root's frame, at the values of all joints.
-
-    Every visual is a mesh.
-    """
+    """Return link and mesh of every visual in the root's frame, at the values of all joints."""
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
     urdf.update_cfg({name: joints[name] for name in urdf.actuated_joint_names})
     meshes = []
     for name, link in urdf.link_map.items():
         for visual in link.visuals:
-            shape = visual.geometry.mesh
-            mesh = trimesh.load_scene(path.parent / shape.filename).to_mesh()
-            mesh.apply_scale(1.0 if shape.scale is None else shape.scale)
+            shape = visual.geometry
+            if shape.mesh is not None:
+                scene = trimesh.load_scene(path.parent / shape.mesh.filename)
+                mesh = scene.to_mesh()
+                mesh.apply_scale(1.0 if shape.mesh.scale is None else shape.mesh.scale)
+            elif shape.box is not None:
+                mesh = trimesh.creation.box(extents=shape.box.size)
+            elif shape.cylinder is not None:
+                mesh = trimesh.creation.cylinder(
+                    radius=shape.cylinder.radius, height=shape.cylinder.length
+                )
+            else:
+                mesh = trimesh.creation.icosphere(subdivisions=3, radius=shape.sphere.radius)
             mesh.apply_transform(np.eye(4) if visual.origin is None else visual.origin)
             mesh.apply_transform(urdf.get_transform(name))
             meshes.append((name, mesh))
