@@ -55,6 +55,10 @@ MANY, HEAP_STEP = 12, 2e-3
 """[1, s] Number of bodies in motion beyond which the steps are longer, so that the arm's control
 does not wait for a heap."""
 
+CREEP_SPEED, CREEP_TIME = 0.02, 0.02
+"""[m/s, and 10 times as many rad/s; s] Speed below which a body of many in motion loses it within
+about this time. The inexact forces in a heap would move its bodies without end."""
+
 MANY_CONTACTS, HEAP_ITERATIONS = 200, 50
 """[1, 1] Number of contacts beyond which their forces are found in so many iterations of a simple
 search, and so they are also between bodies that overlap deeply."""
@@ -217,6 +221,9 @@ class BodySimulation:
         place = np.where(still, motion.place, place)
         place[:, :3] += ways
         velocity = np.where(still, 0.0, velocity)
+        if many:
+            creeps = _is_slow(velocity, CREEP_SPEED)[:, None]
+            velocity = np.where(creeps, velocity * max(0.0, 1.0 - dt / CREEP_TIME), velocity)
         rest_time = np.where(_is_slow(velocity, SLOW), motion.rest_time + dt, 0.0)
         rest_time[parting] = 0.0
         # A body waits for those beside it, because its fall asleep jolts what leans on it.
