@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
-from katana450.assembly.event_log.disk_log import DiskLog
-from katana450.assembly.event_log.log_files import MAX_FILE_BYTES, MAX_FILES, lines_of, log_files
-from katana450.assembly.event_log.records import Record, record
+from katana450.assembly.event_log.disk_log import (
+    MAX_FILE_BYTES,
+    MAX_FILES,
+    DiskLog,
+    Record,
+    log_files,
+    record,
+)
 
 CLOSING = 20.0
 """[s] Timeout of the writer's end."""
@@ -30,12 +36,11 @@ def numbered(count: int) -> list[Record]:
     return [record("command", {"command": "Joint", "value": n}) for n in range(count)]
 
 
+def lines(folder: Path) -> list[bytes]:
+    """Return all lines of the log, the oldest first."""
+    return [line for path in log_files(folder) for line in path.read_bytes().splitlines()]
+
+
 def records(folder: Path) -> list[Record]:
     """Return all records of the log."""
-    entries = [line.record for line in lines_of(folder)]
-    return [entry for entry in entries if entry is not None]
-
-
-def newest(folder: Path) -> Path:
-    """Return the newest file of the log."""
-    return log_files(folder)[-1]
+    return [json.loads(line) for line in lines(folder)]

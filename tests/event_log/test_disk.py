@@ -10,9 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from katana450.assembly.event_log.disk_log import DiskLog
-from katana450.assembly.event_log.log_files import PRESENT, LogFile
-from katana450.assembly.event_log.records import Record, record
+from katana450.assembly.event_log.disk_log import PRESENT, DiskLog, LogFile, Record, record
 from katana450.client import connect
 from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
@@ -82,22 +80,6 @@ def test_record_that_cannot_be_written_is_counted(
     writer.close(requested=True, timeout=CLOSING)
     start, lost, end = records(tmp_path)
     assert (lost["what"]["count"], start["kind"], end["kind"]) == (1, "start", "end")
-
-
-def test_deleted_log_begins_again(tmp_path: Path) -> None:
-    writer = DiskLog(tmp_path, 8080)
-    until(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
-    (tmp_path / PRESENT).unlink()
-
-    def written() -> bool:
-        writer.put(record("command"))
-        time.sleep(0.1)
-        return (tmp_path / PRESENT).exists()
-
-    until(written)
-    writer.close(requested=True, timeout=CLOSING)
-    lost, *_, end = records(tmp_path)
-    assert (lost["kind"], end["kind"]) == ("lost", "end")
 
 
 def test_second_writer_of_a_folder_waits_for_the_first(

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from katana450.arm.control.lease import Role
-from katana450.assembly.event_log.records import Record
+from katana450.assembly.event_log.disk_log import Record
 from katana450.cli.main import main
 from katana450.client import aconnect
 from katana450.client.asynchronous import AsyncClient
@@ -192,7 +192,7 @@ end | the server | server | - | - | -
 """.splitlines()
 """Everything that was done."""
 
-UNORDERED = ("join", "leave", "finding", "outcome")
+UNORDERED = ("join", "leave", "finding")
 """Kinds that have their own times, among the others."""
 
 

@@ -118,7 +118,6 @@ class Gateway:
 
     def attach(self, arm: ArmHandle) -> None:
         """Let clients drive ``arm`` from now on."""
-        arm.listen(self.hub.recorder.outcomes)
 
         def attach() -> None:
             self.hub.gate.arm = arm

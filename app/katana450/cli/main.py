@@ -19,12 +19,6 @@ CORE_COMMANDS = (
         "katana450.cli.serve_options:add_serve_options",
         "katana450.cli.serve:serve",
     ),
-    CliCommand(
-        "log",
-        "show the event log of a server",
-        "katana450.assembly.event_log.log_command:add_log_options",
-        "katana450.assembly.event_log.log_command:log",
-    ),
 )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
 
@@ -24,12 +24,9 @@ class Outcomes:
         self._lock = threading.Lock()
         self._known: OrderedDict[int, Outcome] = OrderedDict()
         self._awaited: OrderedDict[int, list[Future[Outcome]]] = OrderedDict()
-        self.listener: Callable[[Sequence[TicketOutcome]], None] = lambda _outcomes: None
-        """Callback with new outcomes, in the thread that notes them."""
 
     def note(self, outcomes: Iterable[TicketOutcome]) -> None:
         """Record ``outcomes``, and wake the threads that wait for them."""
-        outcomes = tuple(outcomes)
         ready: list[tuple[Future[Outcome], Outcome]] = []
         with self._lock:
             for ticket, outcome in outcomes:
@@ -41,7 +38,6 @@ class Outcomes:
             # A future that was cancelled meanwhile takes no result.
             with suppress(InvalidStateError):
                 future.set_result(outcome)
-        self.listener(outcomes)
 
     def of(self, ticket: int) -> Future[Outcome]:
         """Return a future of the outcome of ``ticket``; each caller may cancel its own."""

@@ -11,22 +11,22 @@ import logging
 import math
 import threading
 import time
-from collections import Counter, OrderedDict
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from queue import Empty
 from typing import Any
 
+import msgspec
+import numpy as np
+
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.commands.act import Command
-from katana450.arm.control.session.outcome import reason
+from katana450.arm.control.commands.act import Act, Command, content_names
 from katana450.arm.control.state.event_log import LogEntry
 from katana450.arm.control.state.messages import finding_text
-from katana450.arm.control.state.state import Outcome, Verdict
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.assembly.event_log.record_content import content_of
-from katana450.assembly.event_log.records import Record, record, text, utc
+from katana450.assembly.event_log.disk_log import Record, record, text, utc
+from katana450.maths.planning.plan import Plan
 from katana450.server.service.limits import SenderBuckets, TokenBucket
 from katana450.server.service.recorder import Note, Recorder
 
@@ -35,9 +35,6 @@ STREAM_GAP = 1.0
 
 MAX_STREAM_SECONDS = 60.0
 """[s] Duration after which a long stream gets another record."""
-
-MAX_TICKETS = 1024
-"""Maximum number of commands whose outcome is awaited."""
 
 SUBJECT = ("axis", "name", "trait")
 """Attributes by which commands of one class belong to different streams."""
@@ -60,7 +57,6 @@ LIMITS = {
     "clear": (30.0, 0.5),
     "lease": (60.0, 0.5),
     "finding": (200.0, 1.0),
-    "outcome": (200.0, 1.0),
     "refusal": (20.0, 0.2),
     **dict.fromkeys(("join", "leave", "rename", "sign-in", "upload"), SESSION),
 }
@@ -88,13 +84,21 @@ CLOSE_TIMEOUT = 1.0
 """[s] Time for the last records at the end of the process."""
 
 
+MAX_ITEMS = 16
+"""Maximum number of items of a list or of fields in a record; a pose has 16 numbers."""
+
+MAX_DEPTH = 3
+"""Maximum depth of values in values; what is deeper is left out."""
+
+SECRETS = frozenset({"token", "key", "cookie", "authorization"})
+"""Names of fields whose values are never recorded."""
+
+
 class RecordMaker:
     """Makes records of notes. For one thread."""
 
     def __init__(self) -> None:
         self._streams: dict[StreamKey, tuple[float, float]] = {}
-        self._commands: OrderedDict[int, Note] = OrderedDict()
-        self._outcomes: list[Note] = []
         self._limits = RecordLimits()
         self._made: list[Record] = []
         self._stopped = False
@@ -107,14 +111,8 @@ class RecordMaker:
         """
         # Anew each time: the clock of the day may have been set.
         self._epoch = time.time() - time.perf_counter()
-        # Their thread can be quicker than the one that gave the command, so they wait for a turn.
-        outcomes, self._outcomes = self._outcomes, []
-        for note in outcomes:
-            self._outcome(note)
         for note in notes:
             self._take(note)
-        for note in self._outcomes if closing else ():
-            self._outcome(note)
         spans = self._streams.items()
         self._streams = {key: span for key, span in spans if t - span[1] <= STREAM_GAP}
         if (summary := self._limits.summary(t, at_once=closing)) is not None:
@@ -125,14 +123,12 @@ class RecordMaker:
     @property
     def is_idle(self) -> bool:
         """True if no record will become due without another note."""
-        return not (self._outcomes or self._limits.unwritten)
+        return not self._limits.unwritten
 
     def _take(self, note: Note) -> None:
         match note.what:
             case Command() if note.kind == "command":
                 self._command(note, note.what)
-            case Outcome():
-                self._outcomes.append(note)
             case LogEntry():
                 self._finding(note.what)
             case _:
@@ -143,10 +139,6 @@ class RecordMaker:
                 self._add(note, content_of(note.what))
 
     def _command(self, note: Note, command: Command) -> None:
-        if note.ticket:
-            self._commands[note.ticket] = note
-            if len(self._commands) > MAX_TICKETS:
-                self._commands.popitem(last=False)
         key = _stream_key(note, command)
         if key is None:
             self._streams.clear()
@@ -162,15 +154,6 @@ class RecordMaker:
         self._streams[key] = first, note.t
         if isinstance(command, cmd.Jog) and not command.rates.any():
             del self._streams[key]
-
-    def _outcome(self, note: Note) -> None:
-        """Record that a command was limited or refused."""
-        command, outcome = self._commands.pop(note.ticket, None), note.what
-        if command is not None:
-            limited = outcome.verdict is Verdict.LIMITED
-            why = "; ".join(map(finding_text, outcome.findings)) if limited else reason(outcome)
-            named = note._replace(actor=command.actor, outcome=outcome.verdict.value, why=why)
-            self._add(named, {"command": type(command.what).__name__})
 
     def _finding(self, entry: LogEntry) -> None:
         finding = entry.finding
@@ -190,14 +173,12 @@ class RecordMaker:
             "kind": note.kind,
             "who": _who(note.actor),
         }
-        if note.ticket and isinstance(what, dict):
-            what = {**what, "ticket": note.ticket}
         actor, grounds = note.actor, note.grounds
         if actor is not None and actor.grounds is not None:
             grounds = actor.grounds.value
         more = {"what": what, "grounds": grounds, "outcome": note.outcome, "why": text(note.why)}
         record |= {name: value for name, value in more.items() if value}
-        if note.always or self._limits.admits(_source(note.actor), record, note.t):
+        if note.always or self._limits.admits(_source(note.actor), note.kind, note.t):
             self._made.append(record)
 
 
@@ -246,18 +227,16 @@ class RecordLimits:
     """Limits by participant and kind, and for all participants by kind.
 
     Attributes:
-        unwritten: number of records that were not written since the last summary, by participant,
-            kind and name.
+        unwritten: number of records that were not written since the last summary.
     """
 
     def __init__(self) -> None:
-        self.unwritten: Counter[str] = Counter()
+        self.unwritten = 0
         self._kinds: dict[str, SenderBuckets] = {}
         self._since = 0.0
 
-    def admits(self, source: str, record: Record, t: float) -> bool:
-        """Return whether ``record`` of ``source`` is written at ``t`` [s]; count it otherwise."""
-        kind = record["kind"]
+    def admits(self, source: str, kind: str, t: float) -> bool:
+        """Return whether a record of ``source`` is written at ``t`` [s]; count it otherwise."""
         if kind not in self._kinds:
             burst, rate = LIMITS.get(kind, COMMANDS)
             total = TokenBucket(EVERYBODY_FACTOR * rate, EVERYBODY_FACTOR * burst, t)
@@ -266,7 +245,7 @@ class RecordLimits:
             return True
         if not self.unwritten:
             self._since = t
-        self.unwritten[_label(record)] += 1
+        self.unwritten += 1
         return False
 
     def summary(self, t: float, *, at_once: bool = False) -> Record | None:
@@ -274,26 +253,16 @@ class RecordLimits:
 
         None if nothing is due; ``at_once``: whether all is.
         """
-        counts, seconds = self.unwritten, t - self._since
-        if not counts or not (at_once or seconds >= SUMMARY_INTERVAL):
+        count, seconds = self.unwritten, t - self._since
+        if not count or not (at_once or seconds >= SUMMARY_INTERVAL):
             return None
-        self.unwritten = Counter()
-        commonest = dict(counts.most_common(8))
-        what = {"count": counts.total(), "seconds": round(seconds, 1), "of": commonest}
+        self.unwritten = 0
+        what = {"count": count, "seconds": round(seconds, 1)}
         return {"kind": "more", "what": what, "t": round(t, 3)}
 
 
-def _label(record: Record) -> str:
-    """Return participant and kind of ``record``, with the name of its command or request."""
-    what = record.get("what")
-    name = ""
-    if isinstance(what, dict):
-        name = what.get("command") or what.get("request") or what.get("lease") or ""
-    return f"{record['who']['name']}: {record['kind']} {name}".strip()
-
-
 class RecordSender:
-    """Sends records of the notes of ``recorder`` to a ``LogWriter`` at the end of ``pipe``."""
+    """Sends records of the notes of ``recorder`` to a ``DiskLog`` at the end of ``pipe``."""
 
     def __init__(self, recorder: Recorder, pipe: Connection) -> None:
         """Start the thread."""
@@ -342,3 +311,59 @@ class RecordSender:
         if lost:
             records.append(record("lost", {"count": lost}, why="Too many events came at once."))
         return records
+
+
+def content_of(what: Any) -> Any:
+    """Return ``what``, an act or another value, as a JSON value of bounded size."""
+    if not isinstance(what, Act):
+        return _bounded(_plain(what))
+    if isinstance(what, cmd.Batch):
+        parts = [content_of(part) for part in what.parts[:MAX_ITEMS]]
+        return {"command": "Batch", "count": len(what.parts), "parts": parts}
+    kind = "command" if isinstance(what, cmd.Command) else "request"
+    fields = {name: _plain(getattr(what, name)) for name in content_names(type(what))}
+    return {kind: type(what).__name__, **_bounded(fields)}
+
+
+def _plain(value: Any) -> Any:
+    """Return ``value`` made of the types of JSON; of a plan its duration alone."""
+    if isinstance(value, Plan):
+        return {"seconds": value.duration}
+    return msgspec.to_builtins(value, enc_hook=_described, str_keys=True)
+
+
+def _described(value: Any) -> Any:
+    """Return what a record holds of a value that msgspec does not know."""
+    match value:
+        case np.generic():
+            return value.item()
+        case np.ndarray():
+            # A mesh has thousands, which are not copied.
+            few = value.size <= MAX_ITEMS
+            return value.ravel().tolist() if few else f"{value.size} values"
+    return type(value).__name__
+
+
+def _bounded(value: Any, depth: int = 0) -> Any:
+    """Return ``value`` of bounded size, without secrets. Numbers have six digits."""
+    match value:
+        case float():
+            number = float(f"{value:.6g}")
+            # JSON has no infinity.
+            return number if abs(number) < float("inf") else str(value)
+        case str():
+            return text(value)
+        case dict() | list() | tuple() if depth >= MAX_DEPTH:
+            return "..."
+        case dict():
+            fields = [(text(name), entry) for name, entry in value.items() if name not in SECRETS]
+            return {
+                name: _bounded(entry, depth + 1)
+                for name, entry in fields[:MAX_ITEMS]
+                if entry is not None
+            }
+        case list() | tuple() if len(value) > MAX_ITEMS:
+            return f"{len(value)} values"
+        case list() | tuple():
+            return [_bounded(entry, depth + 1) for entry in value]
+    return value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Future
 
 from katana450.arm.control.actor import Actor
@@ -21,7 +21,6 @@ from katana450.arm.robot.weight import loads_of
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import CommandSink
-from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.pipes.front_end import FrontEnd
 from katana450.arm.runtime.pipes.state_publisher import Snapshot
 from katana450.arm.runtime.planning_worker import PlanningWorker
@@ -126,10 +125,6 @@ class ArmHandle:
     def outcome(self, ticket: int) -> Future[Outcome]:
         """Return the outcome of the command of ``ticket``, once the arm's process reports it."""
         return self._state_publisher.outcomes.of(ticket)
-
-    def listen(self, listener: Callable[[Sequence[TicketOutcome]], None]) -> None:
-        """Call ``listener`` with all outcomes from now on, in the thread of the pipe."""
-        self._state_publisher.outcomes.listener = listener
 
     @property
     def state(self) -> State:

@@ -1,23 +1,19 @@
 """Notes of events for an event log: who did what, as the thread in which it happens notes it.
 
-Taking a note costs about a microsecond and never waits. The extension ``event_log`` makes records
-of the notes, in a thread of its own, and writes them.
+Taking a note costs about a microsecond and never waits. ``assembly.event_log`` makes records of the
+notes, in a thread of its own, and writes them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.commands.act import Command
 from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.errors import KatanaError
-
-if TYPE_CHECKING:
-    from katana450.arm.runtime.outcomes import TicketOutcome
 
 MAX_WAITING = 4096
 """Maximum number of notes that wait for their reader; more are counted and dropped, except those
@@ -43,11 +39,10 @@ class Note(NamedTuple):
         t: time [s] on the clock of the states.
         kind: kind of the record.
         actor: the participant; None for the arm's own process.
-        what: a command, request, outcome or log entry, or a JSON value.
+        what: a command, request or log entry, or a JSON value.
         outcome: ``accepted`` or ``refused``, if known.
         why: reason in words.
         grounds: right to do this, in words, where that of the actor does not say it.
-        ticket: ticket of a command; 0 without one.
         always: whether the note is kept and its record written, whatever the limits.
     """
 
@@ -58,7 +53,6 @@ class Note(NamedTuple):
     outcome: str = ""
     why: str = ""
     grounds: str = ""
-    ticket: int = 0
     always: bool = False
 
 
@@ -88,9 +82,9 @@ class Recorder:
         else:
             self.lost += 1
 
-    def command(self, command: Command, actor: Actor, ticket: int) -> None:
+    def command(self, command: Command, actor: Actor) -> None:
         """Note an accepted command."""
-        self.note("command", actor, command, outcome=ACCEPTED, ticket=ticket)
+        self.note("command", actor, command, outcome=ACCEPTED)
 
     def refuse(self, what: Any, actor: Actor, error: KatanaError) -> None:
         """Note that ``what``, a command or request or its name, was refused with ``error``.
@@ -118,12 +112,6 @@ class Recorder:
         names = {"from": old and old.name, "to": new and new.name}
         what = {"lease": act, **{word: name for word, name in names.items() if name}}
         self.note("lease", by, what, grounds=LEASE_GROUNDS.get(act, "holds the lease"))
-
-    def outcomes(self, outcomes: Iterable[TicketOutcome]) -> None:
-        """Note the outcomes of commands that were limited or refused."""
-        for ticket, outcome in outcomes:
-            if outcome.verdict.value != ACCEPTED:
-                self.note("outcome", None, outcome, ticket=ticket)
 
 
 def stranger(address: str) -> Actor:
