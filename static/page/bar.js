@@ -16,8 +16,8 @@ const stopButton = element("stop", HTMLButtonElement);
 const text = (id, words) => write(element(id, HTMLElement), words);
 /** @param {string} id @param {boolean} hidden */
 const hide = (id, hidden) => (element(id, HTMLElement).hidden = hidden);
-/** @param {number} seconds @param {Intl.DateTimeFormatOptions} [style] */
-const time = (seconds, style) => clock(new Date(1000 * seconds), style);
+/** @param {number} seconds */
+const time = (seconds) => clock(new Date(1000 * seconds));
 
 /** Whether this window may take the detour that the arm offers. @param {Page.Store} store */
 export function mayGo({ live }) {
@@ -84,9 +84,7 @@ export class Bar {
 
   /** @param {Page.Status} status @param {string | null} proven */
   #drawWords(status, proven) {
-    const since = status.paused_at ? time(status.paused_at, { timeStyle: "short" }) : "";
     if (proven) head("Stopped");
-    else if (since) head(`${status.headline}, ${since}`, since);
     else head(status.headline, status.end);
     const moment = status.stopped_at ? `${time(status.stopped_at)}:` : "";
     const cause = status.stopped ? [moment, status.stopped] : [proven];

@@ -74,7 +74,7 @@ def motion(person: Person) -> None:
     person.fold_panel()
     truth.wait(moving=True)
     person.pause(lambda: truth.status()["status"])
-    page.wait_until(lambda: bar(page, "headline").startswith("Paused by you"), "the pause")
+    page.wait_until(lambda: bar(page, "headline").startswith("Paused"), "the pause")
     person.keep("paused")
     resume(page)
     truth.wait(moving=True)

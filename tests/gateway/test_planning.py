@@ -98,13 +98,13 @@ def test_pause_during_planning_starts_the_program_paused(table: Staged, slow: Sl
     table.arm.rest = replace(table.arm.rest, paused=True)
     shown = table.bar(participant)
     assert shown["headline"] == "Planning Wave 20 %"
-    assert shown["why"].startswith("Paused by you. Step 1 of 2: timing paths.")
+    assert shown["why"].startswith("Paused. Step 1 of 2: timing paths.")
     assert shown["why"].endswith("Then it waits for Resume.")
     assert (shown["paused"], shown["pace"], shown["orders"]) == (True, "", ["end"])
     finish(table, participant, slow)
     assert table.status == "paused"
     shown = table.bar(participant)
-    assert (shown["mood"], shown["headline"]) == ("paused", "Paused by you")
+    assert (shown["mood"], shown["headline"]) == ("paused", "Paused")
     assert shown["why"].startswith("Wave: speed, step 1 of 2")
     assert not any(isinstance(command, cmd.Resume) for command in table.arm.commands)
     table.wait(60.0, participant)

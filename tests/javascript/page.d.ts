@@ -25,7 +25,7 @@ declare namespace Page {
   /** What the server says about the arm and the lease; see `server/service/status.py`. */
   interface Status {
     mood: string; headline: string; why: string; end: string;
-    paused_at: number | null; stop: string | null; stopped: string | null; stopped_at: number | null;
+    stop: string | null; stopped: string | null; stopped_at: number | null;
     wait: string; problem: string | null; holder: string | null; silence_profile: string; detour: boolean;
     speed: number; paused: boolean; arm: ArmStatus | null; participants: number; revocations: number; scripts: boolean;
     pace: string; may_clear_stop: boolean; until: string; name: string; role: string; mine: boolean;

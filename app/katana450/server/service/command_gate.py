@@ -23,7 +23,7 @@ from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.heartbeats import check_in_time
 from katana450.server.service.recorder import Recorder
-from katana450.server.service.stop_state import LastPause, StopRecord
+from katana450.server.service.stop_state import StopRecord
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -63,7 +63,6 @@ class CommandGate:
         """The running program; None without one."""
         self.ended: RunningProgram | None = None
         """The program that was interrupted last, until a participant gets the lease."""
-        self.last_pause: LastPause | None = None
         self.revocations = self.motions = 0
         """Number of stops and losses of the lease; of commands that superseded a motion."""
         self.on_stop: Callable[[], None] = lambda: None
@@ -101,7 +100,6 @@ class CommandGate:
                     before, caught_up = arm.state, arm.caught_up
                     ticket = arm.deliver(command, granted)
                     self.motions += any(part.traits.supersedes for part in command.parts)
-                    self.last_pause = LastPause.after(self.last_pause, command, actor, before)
                     for note in self.delivered:
                         guarded(partial(note, command, granted, before, caught_up))()
             except KatanaError as error:
@@ -109,7 +107,7 @@ class CommandGate:
                 raise
             if isinstance(command, cmd.Jog):
                 self._jogged = self._clock() if command.rates.any() else -cmd.JOG_TIME
-            self.recorder.command(command, granted, ticket)
+            self.recorder.command(command, granted)
             return ticket
 
     def _checked(self, command: cmd.Command, actor: Actor) -> Actor:
@@ -331,10 +329,9 @@ class CommandGate:
         return self.stopped.ticket or 0
 
     def _end_gestures(self) -> None:
-        """Void what was received and planned before a stop, which also ends a pause."""
+        """Void what was received and planned before a stop."""
         self._revoke()
         self.on_stop()
-        self.last_pause = None
 
     def _adopt(self, cause: StopCause, arm: ArmHandle) -> None:
         """Record a stop that the arm has executed and this gate has not sent."""

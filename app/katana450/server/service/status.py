@@ -62,8 +62,7 @@ def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:
     stopped, age = hub.stopped, silence(hub)
     now = StatusLine("starting", "Starting", "")
     if state is not None:
-        head = paused_headline(hub, reader) if rests_paused(state) else headline(state)
-        now = StatusLine(mood(state), head, sentence(state))
+        now = StatusLine(mood(state), headline(state), sentence(state))
         plans = hub.arm is not None and hub.arm.busy and not state.moving and not state.paused
         if plans and not hub.runner.running:
             now = StatusLine("planning", "Planning a path", "The arm then follows it.")
@@ -86,21 +85,6 @@ def arm_mode(hub: Hub) -> ArmMode | None:
     """Return the mode of a real arm; None for another one."""
     report = None if hub.arm is None else hub.arm.state.report
     return None if report is None else report.mode
-
-
-def rests_paused(state: State) -> bool:
-    """Return whether a person or a program has paused the arm, and it rests."""
-    return state.paused and not state.moving
-
-
-def paused_headline(hub: Hub, reader: Person | None) -> str:
-    """Return the headline of a paused arm, in which ``reader`` is "you"."""
-    pause, program = hub.gate.last_pause, hub.gate.program
-    if pause is None:
-        return "Paused"
-    if program is not None and pause.key == program.person.key:
-        return "Paused after a step"
-    return f"Paused by {'you' if reader is not None and pause.key == reader.key else pause.name}"
 
 
 def arm_status(state: State, report: ArmReport) -> dict[str, Any]:
@@ -134,11 +118,8 @@ def common(hub: Hub) -> dict[str, Any]:
     """Return the part of the status that is the same for all pages."""
     state = hub.arm.state if hub.arm is not None else None
     stopped, holder, age = hub.stopped, hub.lease.driver, silence(hub)
-    now, pause = state_line(hub), hub.gate.last_pause
-    timed = pause is not None and now.headline.startswith(f"Paused by {pause.name}")
     return {
-        **now._asdict(),
-        "paused_at": pause.at if timed and pause is not None else None,
+        **state_line(hub)._asdict(),
         "stop": None if stopped is None else stopped.stage,
         "stopped": None if stopped is None else stopped.why,
         "stopped_at": None if stopped is None else stopped.cause.at or None,
@@ -168,7 +149,6 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     planning = program is not None and program.status == "planning"
     taker = hub.taken_by(participant)
     age = hub.pictures.age(participant.person.key, hub.clock())
-    own_pause = hub.gate.last_pause is not None and hub.gate.last_pause.key == person.key
     stopped = hub.stopped
     own_stop = None if stopped is None or stopped.cause.key != person.key else stopped.why
     clears = hub.gate.may_clear(person)
@@ -178,7 +158,7 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     if (mode := arm_mode(hub)) in UNCONTROLLED:
         stays = UNCONTROLLED[mode][1]
     return {
-        **(state_line(hub, person)._asdict() if own_pause or hub.runner.names(person) else {}),
+        **(state_line(hub, person)._asdict() if hub.runner.names(person) else {}),
         **({"stopped": addressed(own_stop, person.name)} if own_stop else {}),
         "pace": pace_refusal(hub, participant),
         "may_clear_stop": clears,

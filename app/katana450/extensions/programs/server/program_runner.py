@@ -47,7 +47,6 @@ from katana450.server.service.dispatcher import ACCEPTED
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.runner import Runner, StatusLine
-from katana450.server.service.stop_state import LastPause
 
 log = logging.getLogger(__name__)
 
@@ -201,11 +200,7 @@ class ProgramRunner(Runner):
                 self._run, commands = runner.stepping(self._run)
                 return self._runs_as.send(*commands)
             case ProgramOrder.PAUSE:
-                paused = self.hub.present().state.paused
-                ticket = self._runs_as.send(cmd.Pause())
-                if not paused:
-                    self.hub.gate.last_pause = LastPause.by(participant.actor)
-                return ticket
+                return self._runs_as.send(cmd.Pause())
             case ProgramOrder.END:
                 return self._end(f"{participant.person.name} ended it.")
             case ProgramOrder.CONTINUE:
