@@ -17,15 +17,10 @@ from unittest.mock import Mock
 import pytest
 from ruckig import Ruckig
 
-from katana450.assembly import supervisor as supervisor_module
 from katana450.assembly.robot_session import find_robot
 from katana450.assembly.supervised import SupervisorPipe
 from katana450.assembly.supervisor import (
-    MIN_PROGRESS,
-    START_SECONDS,
-    ChildSpec,
     Supervisor,
-    Work,
     child_spec,
 )
 from katana450.cli import serve
@@ -97,36 +92,6 @@ def test_end_amid_work_of_a_thread_lists_no_leaks(capfd: pytest.CaptureFixture[s
     assert process.exitcode == 0
     assert "It ends." in output.out
     assert "leaked" not in output.err
-
-
-def never(_kept: object) -> Work:
-    raise AssertionError("It is not started.")
-
-
-def test_start_takes_its_time_while_any_process_makes_progress(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    now = 100.0
-    monkeypatch.setattr(supervisor_module, "time", SimpleNamespace(monotonic=lambda: now))
-    specs = [ChildSpec(name, name, never, 1.0) for name in ("arm", "front")]
-    supervisor = Supervisor(specs, threading.Event())
-    arm, front = supervisor._children.values()
-    for child in (arm, front):
-        child.due = None
-        child.excuse(now)
-    for _ in range(10):
-        now += 0.9 * START_SECONDS
-        # The front end waits for the arm.
-        arm.used += 1.1 * MIN_PROGRESS
-        supervisor.note_progress()
-        arm._heard = front._heard = now
-        assert (arm.hangs, front.hangs) == (None, None)
-    now += 1.1 * START_SECONDS
-    supervisor.note_progress()
-    arm._heard = front._heard = now
-    assert arm.hangs == front.hangs == "made no progress for 60 s"
-    arm.used = START_SECONDS + 1.0
-    assert arm.hangs == "was not ready after 60 s of processor time"
 
 
 def test_folder_of_a_killed_server_is_removed_at_the_next_start(

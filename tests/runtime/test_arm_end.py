@@ -29,9 +29,9 @@ from katana450.arm.runtime.pipes.arm_end import ArmEnd, CommandMessage
 from katana450.arm.runtime.pipes.arm_roles import FRONT
 from katana450.arm.runtime.pipes.front_end import FrontEnd
 from katana450.arm.runtime.pipes.private_listener import Greeting
-from katana450.assembly import running_arm
+from katana450.assembly import arm_process
+from katana450.assembly.arm_process import RunningArm
 from katana450.assembly.robot_session import DescribedRobot
-from katana450.assembly.running_arm import RunningArm
 from katana450.errors import InputError
 from katana450.settings import Settings
 from tests.waiting import until
@@ -418,7 +418,7 @@ def test_arm_ends_stopped_and_at_rest_although_a_command_has_just_arrived(
     robot: Robot, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The priority of this process stays.
-    monkeypatch.setattr(running_arm, "raise_priority", lambda: None)
+    monkeypatch.setattr(arm_process, "raise_priority", lambda: None)
     arm = RunningArm(Settings(), DescribedRobot(robot, session, ()))
     arm.start()
     ours, theirs = multiprocessing.Pipe()

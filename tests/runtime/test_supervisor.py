@@ -68,15 +68,6 @@ def failing(_folder: Path, _supervisor: SupervisorPipe) -> None:
     raise SystemExit(3)
 
 
-def deaf(folder: Path, supervisor: SupervisorPipe) -> None:
-    """Report once that the worker is not heard, some time after that is ready."""
-    supervisor.report(READY)
-    until((folder / "pid0").exists)
-    time.sleep(0.3)
-    supervisor.report_unheard("worker")
-    supervisor.ended.wait()
-
-
 def careless(folder: Path, supervisor: SupervisorPipe) -> None:
     """Meet an error in a thread, once the first start is over."""
 
@@ -134,20 +125,6 @@ def test_process_without_heartbeats_is_ended(tmp_path: Path) -> None:
     running = Running(child_spec("stubborn", "It", partial(stubborn, tmp_path), 0.5))
     try:
         until(lambda: len((tmp_path / "started").read_text()) >= 2)
-    finally:
-        running.stop()
-
-
-def test_process_that_another_one_no_longer_hears_starts_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(supervisor_module, "MAX_UNHEARD_TIME", 0.1)
-    running = Running(
-        child_spec("worker", "The worker", partial(worker, tmp_path), 5.0, keeps=True),
-        child_spec("deaf", "The deaf one", partial(deaf, tmp_path), 5.0),
-    )
-    try:
-        until((tmp_path / "pid1").exists)
     finally:
         running.stop()
 

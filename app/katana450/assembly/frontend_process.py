@@ -10,7 +10,6 @@ import socket
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, NamedTuple
 
-from katana450.assembly.arm_process import ARM
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.extension import ServerFacts
 from katana450.platform_support import reset_priority
@@ -23,10 +22,6 @@ OPEN = "open"
 
 WAKE_INTERVAL = 0.25
 """[s] Interval at which a failure of the view is checked."""
-
-MAX_ARM_SILENCE = 3.0
-"""[s] Time without a message of the arm's process after which the supervisor is asked to end it: it
-answers the supervisor, or would have been ended before."""
 
 HANG_SECONDS = 5.0
 """[s] Time after which an event loop that does not turn counts as hung."""
@@ -102,8 +97,6 @@ def _run(
         while not supervisor.ended.wait(WAKE_INTERVAL) and not frontend.pipe.cut.is_set():
             if frontend.view.failed.is_set():
                 raise SystemExit(1)
-            if frontend.pipe.age > MAX_ARM_SILENCE:
-                supervisor.report_unheard(ARM)
         frontend.pipe.close()
         web.stop()
         frontend.stop()

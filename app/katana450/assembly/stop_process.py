@@ -6,15 +6,22 @@ ends or hangs; the arm does not stop for that.
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import time
 from functools import partial
 
 from katana450.arm.runtime.pipes.arm_roles import STOP
 from katana450.arm.runtime.pipes.private_listener import Greeting, connect_when_ready
+from katana450.arm.runtime.pipes.stop_pipe import StopPipe
+from katana450.assembly.authentication import access_file, address_of, tls_context
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.extension import ServerFacts
 from katana450.platform_support import raise_priority
+from katana450.server.web.acceptor import Acceptor
+from katana450.server.web.authenticator import Authenticator
+from katana450.server.web.listen import raise_descriptor_limit
+from katana450.server.web.stop_server import StopConnection, StopServer
 
 TURN_INTERVAL = 0.2
 """[s] Interval at which the event loop proves that it runs, and checks whether it must end."""
@@ -26,22 +33,10 @@ HANG_TIMEOUT = 1.0
 def run_stop(config: ServerFacts, listening: socket.socket, supervisor: SupervisorPipe) -> None:
     """Run the server of STOP on the socket ``listening``, from start to end. Raises KatanaError."""
     raise_priority()
-    # Imported here, because the supervisor imports this module before it starts the processes.
-    import asyncio
-
     asyncio.run(_serve(config, listening, supervisor))
 
 
 async def _serve(config: ServerFacts, listening: socket.socket, supervisor: SupervisorPipe) -> None:
-    import asyncio
-
-    from katana450.arm.runtime.pipes.stop_pipe import StopPipe
-    from katana450.assembly.authentication import access_file, address_of, tls_context
-    from katana450.server.web.acceptor import Acceptor
-    from katana450.server.web.authenticator import Authenticator
-    from katana450.server.web.listen import raise_descriptor_limit
-    from katana450.server.web.stop_server import StopConnection, StopServer
-
     settings = config.settings
     address = address_of(settings, listening)
     access = access_file(settings, listening)

@@ -28,11 +28,10 @@ from katana450.assembly.log_output import start_log
 from katana450.errors import KatanaError
 from katana450.platform_support import name_process, stop_signals, unblock_stop_signals
 
-HEARTBEAT, REPORT, KEPT, SCENE, UNHEARD, ROBOT = b".", b"r", b"k", b"s", b"u", b"c"
-"""First bytes of the messages to the supervisor: a heartbeat with the processor time that was used
-so far [s]; a status word or an error; the last known state of the arm, without and with its scene,
-which only the arm's process reads; the name of a process from which this one hears nothing; and
-the file of another robot, with which all processes must start again."""
+HEARTBEAT, REPORT, KEPT, SCENE, ROBOT = b".", b"r", b"k", b"s", b"c"
+"""First bytes of the messages to the supervisor: a heartbeat; a status word or an error; the last
+known state of the arm, without and with its scene, which only the arm's process reads; and the file
+of another robot, with which all processes must start again."""
 
 END, NOTICE = b"e", b"n"
 """First bytes of the messages of the supervisor, beside heartbeats: the process must end; and a
@@ -98,10 +97,6 @@ class SupervisorPipe:
             gc.enable()
         self._send(REPORT + pickle.dumps(status))
 
-    def report_unheard(self, name: str) -> None:
-        """Report that the process ``name``, if it runs at all, no longer reaches this one."""
-        self._send(UNHEARD + name.encode())
-
     def replace_robot(self, urdf: Path) -> None:
         """Let the supervisor start all processes again, with the robot in the file ``urdf``."""
         self._send(ROBOT + str(urdf).encode())
@@ -156,7 +151,7 @@ class SupervisorPipe:
                 due = time.monotonic() + 1.5 * self._interval
                 # A supervisor that hangs reads nothing, and the pipe fills.
                 if self._alive() and writable(self._pipe.fileno()):
-                    self._send(HEARTBEAT + b"%.2f" % time.process_time())
+                    self._send(HEARTBEAT)
                 quiet = self._report_silence(quiet)
 
     def _report_silence(self, reported: bool) -> bool:

@@ -32,7 +32,6 @@ from katana450.assembly.supervised import (
     REPORT,
     ROBOT,
     SCENE,
-    UNHEARD,
     SupervisorPipe,
     run_supervised,
 )
@@ -48,12 +47,8 @@ MAX_HEARTBEAT_INTERVAL = 0.4
 TURN = HEARTBEAT_INTERVAL
 """[s] Interval at which signals and silence are checked; the end of a process wakes earlier."""
 
-START_SECONDS = 60.0
-"""[s] Time in which the processes that start must use MIN_PROGRESS, and processor time in which
-each one must be ready. On a busy machine a start takes as long as it needs."""
-
-MIN_PROGRESS = 0.5
-"""[s] Processor time that shows progress: more than heartbeats take in START_SECONDS."""
+START_SECONDS = 300.0
+"""[s] Time in which a process must be ready. On a busy machine a start takes long."""
 
 BUSY_NOTICE_INTERVAL = 20.0
 """[s] Interval at which a long start is reported."""
@@ -63,9 +58,6 @@ START_SILENCE = 30.0
 
 GOODBYE_SECONDS = 5.0
 """[s] Timeout for a process to end by itself."""
-
-MAX_UNHEARD_TIME = 3.0
-"""[s] Time for which a process that is ready may not reach another one."""
 
 RESTART_DELAYS = (0.0, 0.0, 0.0, 1.0, 5.0, 15.0)
 """[s] Delay before a process is started again, by the number of its early ends in a row, from 0."""
@@ -124,15 +116,11 @@ class Child:
         self.spec = spec
         self.statuses: set[str] = set()
         self.error: KatanaError | None = None
-        self.unheard = ""
-        """Name of a process that the newest message says is not heard there; "" for none."""
         self.robot: Path | None = None
         """File of the robot with which all processes must start again; None for no other one."""
         self.kept: Kept = {}
         self.due: float | None = 0.0
         """Time of the next start [s]; None while a process runs."""
-        self.used = 0.0
-        """Processor time that the process has used [s], by its newest heartbeat."""
         self._early_ends = 0
         self._ready_at: float | None = None
         self._started = self._heard = self._beaten = 0.0
@@ -156,7 +144,7 @@ class Child:
             self.process.start()
         # Closed here, so that each side notices when the other is gone.
         theirs.close()
-        self._first, self._ready_at, self.error, self.used = False, None, None, 0.0
+        self._first, self._ready_at, self.error = False, None, None
         self._started = self._heard = time.monotonic()
         self.statuses.clear()
         self._reader = threading.Thread(target=self._read, args=(self._pipe,), daemon=True)
@@ -177,10 +165,6 @@ class Child:
                 kind, content = message[:1], message[1:]
                 if kind in (KEPT, SCENE):
                     self.kept[kind] = content
-                elif kind == HEARTBEAT:
-                    self.used = float(content)
-                elif kind == UNHEARD:
-                    self.unheard = content.decode()
                 elif kind == ROBOT:
                     self.robot = Path(content.decode())
                 elif kind == REPORT:
@@ -198,15 +182,6 @@ class Child:
         if report == READY:
             self._ready_at = time.monotonic()
 
-    @property
-    def starts(self) -> bool:
-        """True while a process runs that is not ready."""
-        return self.due is None and self._ready_at is None
-
-    def note_progress(self) -> None:
-        """Count the time of the start from now on: it, or what it may wait for, makes progress."""
-        self._started = time.monotonic()
-
     def excuse(self, late: float) -> None:
         """Do not count the time ``late`` [s], in which the supervisor itself was held up."""
         # What arrived meanwhile is newer.
@@ -219,18 +194,12 @@ class Child:
         """Why the process counts as hung, in words; None if it does not."""
         now = time.monotonic()
         ready = self._ready_at is not None
-        if not ready and self.used > START_SECONDS:
-            return f"was not ready after {START_SECONDS:g} s of processor time"
         if not ready and now - self._started > START_SECONDS:
-            return f"made no progress for {START_SECONDS:g} s"
+            return f"was not ready after {START_SECONDS:g} s"
         silent = now - self._heard
         if silent > (self.spec.deadline if ready else START_SILENCE):
             return f"has not answered for {silent:.1f} s"
         return None
-
-    def has_been_ready(self, seconds: float) -> bool:
-        """Return whether the process became ready more than ``seconds`` [s] ago."""
-        return self._ready_at is not None and time.monotonic() - self._ready_at > seconds
 
     def beat(self) -> None:
         """Send a heartbeat to the process, unless one was sent in this turn already."""
@@ -250,7 +219,9 @@ class Child:
         self.process.join()
         self.collect()
         self._pipe.close()
-        self._early_ends = 0 if self.has_been_ready(STABLE_SECONDS) else self._early_ends + 1
+        ready_at = self._ready_at
+        stable = ready_at is not None and time.monotonic() - ready_at > STABLE_SECONDS
+        self._early_ends = 0 if stable else self._early_ends + 1
         delay = RESTART_DELAYS[min(self._early_ends, len(RESTART_DELAYS) - 1)]
         self.due = time.monotonic() + delay
         return delay
@@ -275,7 +246,6 @@ class Supervisor:
         self._children = {spec.name: Child(spec) for spec in specs}
         self._stopping = stopping
         self._turned = self._notice_at = time.monotonic()
-        self._used = 0.0
 
     def start(self) -> None:
         """Start all processes, in the given order."""
@@ -341,16 +311,6 @@ class Supervisor:
                 if late > TURN / 2:
                     child.excuse(late)
                 child.beat()
-        self.note_progress()
-
-    def note_progress(self) -> None:
-        """Let processes that start take their time while any of them uses the processor."""
-        starting = [child for child in self._children.values() if child.starts]
-        used = sum(child.used for child in starting)
-        if abs(used - self._used) > MIN_PROGRESS:
-            self._used = used
-            for child in starting:
-                child.note_progress()
 
     def _watch(self, child: Child) -> None:
         if child.due is not None:
@@ -358,7 +318,7 @@ class Supervisor:
                 self._start(child)
             return
         alive = child.running
-        if alive and (why := child.hangs or self._unheard(child)) is not None:
+        if alive and (why := child.hangs) is not None:
             log.error("%s %s and is ended.", child.spec.title, why)
             child.process.kill()
             alive = False
@@ -373,15 +333,6 @@ class Supervisor:
             self._announce(child, text)
             if not delay:
                 self._start(child)
-
-    def _unheard(self, child: Child) -> str | None:
-        """Return why ``child`` counts as lost although it answers; None if it does not."""
-        for other in self._children.values():
-            if other.unheard == child.spec.name:
-                other.unheard = ""
-                if child.has_been_ready(MAX_UNHEARD_TIME):
-                    return f"no longer reaches {other.spec.title[0].lower()}{other.spec.title[1:]}"
-        return None
 
     @staticmethod
     def _start(child: Child) -> None:

@@ -20,16 +20,14 @@ from types import FrameType
 from typing import Any
 
 from katana450.arm.runtime.pipes.private_listener import PrivateAddress
-from katana450.assembly.arm_process import ARM, run_arm
 from katana450.assembly.event_log.disk_log import DiskLog, default_folder
 from katana450.assembly.frontend_process import OPEN, Sockets, run_frontend
 from katana450.assembly.log_output import say, start_log
-from katana450.assembly.stop_process import run_stop
 from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.cli.open_page import show_page
 from katana450.errors import ConfigurationError, KatanaError
-from katana450.extension import ExtraProcess, ServerFacts, results
+from katana450.extension import ExtraProcess, ServerFacts, load, results
 from katana450.platform_support import (
     claim_file,
     create_file,
@@ -43,8 +41,12 @@ from katana450.settings import FIXED, Settings
 
 log = logging.getLogger(__name__)
 
-FRONT_END, STOP = "katana450 front", "katana450 stop"
-"""Names of the processes beside that of the arm."""
+ARM, FRONT_END, STOP = "katana450 arm", "katana450 front", "katana450 stop"
+"""Names of the processes."""
+
+RUN_ARM = "katana450.assembly.arm_process:run_arm"
+RUN_STOP = "katana450.assembly.stop_process:run_stop"
+"""Functions of two of them, whose modules are imported there alone."""
 
 FOLDER_PREFIX, CLAIM = "katana450-", "claim"
 """Begin of the name of a server's private folder, and the file in it that the server locks."""
@@ -146,12 +148,14 @@ class _Server:
         address = PrivateAddress(pipe_address(folder, "arm"), os.urandom(32))
         facts = ServerFacts(settings, options.urdf, options.tool, port, address, options, folder)
         front_end_work = _FrontendWork(facts, self.sockets, event_log)
-        stop = partial(run_stop, facts, self.stopping_socket)
+        stop = partial(_run, RUN_STOP, facts, self.stopping_socket)
         extra: list[ExtraProcess] = [*results("process", options, facts)]
         specs = (
             child_spec(STOP, "The process of STOP", stop, STOP_DEADLINE),
             ChildSpec(FRONT_END, "The page's server", front_end_work, FRONT_END_DEADLINE),
-            child_spec(ARM, "The arm's process", partial(run_arm, facts), ARM_DEADLINE, keeps=True),
+            child_spec(
+                ARM, "The arm's process", partial(_run, RUN_ARM, facts), ARM_DEADLINE, keeps=True
+            ),
             *(
                 replace(
                     child_spec(
@@ -201,6 +205,11 @@ class _Server:
             front_end_work.close()
             os.close(claimed)
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def _run(target: str, *arguments: object) -> None:
+    """Run the function that ``target`` names, in the process that was started for it."""
+    load(target)(*arguments)
 
 
 class _FrontendWork:
