@@ -11,7 +11,7 @@ READY_POSTURE_DEG = (0.0, -68.0, 85.0, 8.0, 0.0)
 and stretched. It leaves room to drag and turn the tool in every direction."""
 
 
-FIXED = frozenset({"rate", "frame_rate", "ready", "sample_delay"})
+FIXED = frozenset({"rate", "ready", "sample_delay"})
 """Names of the settings that no option of ``serve`` sets."""
 
 
@@ -23,7 +23,6 @@ class Settings:
         host: address to listen on; by default only this machine.
         port: TCP port.
         rate: control ticks per second [Hz].
-        frame_rate: maximum rate of view updates [Hz].
         ready: posture in which the arm starts and to which Home returns [rad].
         silence: heartbeat timeout of the driver, after which a moving arm brakes [s].
         sample_delay: delay above the least of its connection, from which a sample of a jog, drag or
@@ -42,7 +41,6 @@ class Settings:
     host: str = "127.0.0.1"
     port: int = 8080
     rate: float = 100.0
-    frame_rate: float = 60.0
     ready: tuple[float, ...] = tuple(math.radians(angle) for angle in READY_POSTURE_DEG)
     silence: float = 0.25
     sample_delay: float = 0.15

@@ -21,7 +21,7 @@ from katana450.server.service.budget import (
     BusyError,
 )
 from katana450.server.service.limits import SenderBuckets, TokenBucket
-from katana450.server.viser_bridge.flow import (
+from katana450.server.viser_bridge.proxy import (
     MAX_IN_FLIGHT_BYTES,
     MAX_REMEMBERED_FRAMES,
     OVERDUE,

@@ -23,8 +23,7 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import WINDOW, LeastDelay
 from katana450.server.service.participants import Participant
-from katana450.server.viser_bridge.guard import Guard
-from katana450.server.viser_bridge.message_filter import MessageFilter, Ruling
+from katana450.server.viser_bridge.guard import Guard, MessageFilter, Ruling
 from katana450.settings import Settings
 from tests.gateway.test_command_gate import Hooked
 from tests.gateway.test_hub import PAGES, Table, moves

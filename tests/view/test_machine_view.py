@@ -32,7 +32,7 @@ from katana450.server.view.panel import Panel
 from katana450.server.view.panel_folder import FolderContext, PanelFolder
 from katana450.server.view.readout import joint_page
 from katana450.server.view.scene import ArmNodes
-from katana450.server.view.view import Additions, View
+from katana450.server.view.view import View
 from katana450.server.viser_bridge.guard import PERSONAL
 from tests.exchange.trees import tree
 from tests.recording.recorded import state_message
@@ -112,8 +112,7 @@ def test_objects_and_floor_are_shown_at_the_height_of_the_table(
         Snapshot(session.begin(session.ready, 0.0, 0.0), 0), LoopTiming(0.01)
     )
     gestures = RecordedGestures()
-    additions = Additions((HandlesLayer(),), Meshes())
-    view = View(server, robot, publisher, gestures, lambda: 0, session, 30.0, additions)
+    view = View(server, robot, publisher, gestures, lambda: 0, session, (HandlesLayer(),), Meshes())
     view.add_panel(lambda: ())
     floor: Any = internals.nodes(server)["/floor"]
     assert floor.position[2] == pytest.approx(-0.3, abs=1e-3)
@@ -148,8 +147,7 @@ def machine_view(
             if (folder := make(context)) is not None:
                 yield folder
 
-    additions = Additions((HandlesLayer(),), Meshes())
-    view = View(server, robot, publisher, gestures, lambda: 0, session, 30.0, additions)
+    view = View(server, robot, publisher, gestures, lambda: 0, session, (HandlesLayer(),), Meshes())
     view.add_panel(folders)
     return view, session
 

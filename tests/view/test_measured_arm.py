@@ -22,7 +22,7 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.scenery import Scenery
-from katana450.server.view.view import GHOST_FROM, Additions, View
+from katana450.server.view.view import GHOST_FROM, View
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge.internals import nodes
 
@@ -53,8 +53,8 @@ def test_arm_is_drawn_where_it_is_measured_and_its_setpoint_as_a_ghost(
         RecordedGestures(),
         lambda: 0,
         session,
-        30.0,
-        Additions((), Meshes()),
+        (),
+        Meshes(),
     )
 
     def show(q: FloatArray) -> bool:

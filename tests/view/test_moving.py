@@ -13,8 +13,8 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.tool_targets import BranchOption
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
-from katana450.server.view.branches import INTERVAL, BranchList
 from katana450.server.view.controls import Clickable
+from katana450.server.view.panel import INTERVAL, BranchList
 
 
 def test_branches_are_computed_once_a_second_while_the_arm_moves(

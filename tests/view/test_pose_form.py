@@ -10,7 +10,7 @@ import viser
 from katana450.arm.control.session.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.server.view.controls import listener
-from katana450.server.view.pose_form import PoseForm
+from katana450.server.view.panel import PoseForm
 from katana450.server.view.readout import BASE, SHOULDER
 from katana450.server.viser_bridge.guard import Guard
 from tests.view.gestures import RecordedGestures

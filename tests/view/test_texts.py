@@ -28,7 +28,7 @@ from katana450.arm.control.state.messages import (
 from katana450.arm.control.state.state import Finding, Reason, State, Status
 from katana450.maths.collision.contact import Contact
 from katana450.maths.kinematics.branch import BRANCHES
-from katana450.server.view.branches import HEADINGS, cells_of
+from katana450.server.view.panel import HEADINGS, cells_of
 from katana450.server.view.view import GHOST_COLOURS
 
 

@@ -19,7 +19,7 @@ from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
 from katana450.server.view import readout
 from katana450.server.view.panel import Panel
 from katana450.server.view.readout import PoseDisplay
-from katana450.server.view.view_updater import ViewUpdater
+from katana450.server.view.view import ViewUpdater
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
 from tests.waiting import until

@@ -9,8 +9,7 @@ import pytest
 from uvicorn.protocols.utils import ClientDisconnected
 from websockets.asyncio.server import ServerConnection, serve
 
-from katana450.server.viser_bridge.flow import MAX_IN_FLIGHT_BYTES
-from katana450.server.viser_bridge.proxy import SUBPROTOCOL, Proxy, _Line
+from katana450.server.viser_bridge.proxy import MAX_IN_FLIGHT_BYTES, SUBPROTOCOL, Proxy, _Line
 
 
 async def keep_open(connection: ServerConnection) -> None:

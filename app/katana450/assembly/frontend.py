@@ -21,7 +21,7 @@ from katana450.server.service.arm_handle import ArmHandle, Nodes
 from katana450.server.service.command_gate import guarded
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.panel_folder import FolderContext, PanelFolder
-from katana450.server.view.view import Additions, View
+from katana450.server.view.view import View
 
 NODES = "katana450.extensions.export.vrml.vrml_nodes:VrmlNodes"
 """Class of the values that clients read and set by name."""
@@ -67,8 +67,8 @@ class Frontend:
             gateway.gestures,
             lambda: self.pipe.last_ticket,
             session,
-            settings.frame_rate,
-            Additions(added, meshes),
+            added,
+            meshes,
         )
         self._detours: DetourPlanner | None = None
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import viser
@@ -40,6 +42,20 @@ class Cameras:
         self._riding: dict[int, viser.ClientHandle] = {}
         self._lock = threading.Lock()
         server.on_client_disconnect(self._forget)
+
+    def add_buttons(self, gui: viser.GuiApi, current: Callable[[], State]) -> None:
+        """Add the buttons of the views. A click changes only its own browser.
+
+        The view cube of the page presses them, so the panel does not show them. ``current`` returns
+        the newest state.
+        """
+        names = tuple(preset.value for preset in Preset)
+        views = gui.add_button_group("View", names, visible=False)
+
+        @views.on_click
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                self.give(event.client, Preset(views.value), current())
 
     def give(self, client: viser.ClientHandle, preset: Preset, state: State) -> None:
         """Show ``client`` the arm from ``preset``."""

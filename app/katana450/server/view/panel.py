@@ -1,24 +1,40 @@
-"""The panel: joints, gripper and postures, and the pose of the tool in numbers."""
+"""The panel: joints, gripper and postures, the pose of the tool in numbers, and the branches."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from html import escape
 from operator import is_
-from typing import NamedTuple
+from typing import Any
 
 import viser
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.state.messages import degrees, millimetres, signed
+from katana450.arm.control.session.tool_targets import BranchOption
+from katana450.arm.control.state.messages import degrees, millimetres, part, short, signed
 from katana450.arm.control.state.state import State
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from katana450.server.view import readout
-from katana450.server.view.branches import BranchList, Find
-from katana450.server.view.controls import GestureGate, Listen, ends, listener, set_slider
-from katana450.server.view.pose_form import PoseForm
-from katana450.server.view.readout import PoseDisplay
-from katana450.server.view.view_updater import READOUT_INTERVAL
+from katana450.server.view.controls import (
+    GestureGate,
+    Listen,
+    ends,
+    listener,
+    set_slider,
+    set_value,
+)
+from katana450.server.view.readout import BASE, SHOULDER, PoseDisplay
+from katana450.server.view.scene import Colour
+
+READOUT_INTERVAL = 0.1
+"""Time [s] between two updates of numbers and sliders; people cannot read faster changes."""
 
 GESTURES: dict[str, tuple[cmd.Command, str]] = {
     "Home": (cmd.Home(), "to the ready posture"),
@@ -30,12 +46,34 @@ GESTURES: dict[str, tuple[cmd.Command, str]] = {
 TURN_STEP, MIN_STEPS = 0.05, 400
 """[deg] Step of the slider of a joint that turns; minimum number of steps of one that slides."""
 
+MAX_TYPED_POSITION = 1000.0
+"""Maximum [mm] of a typed coordinate, beyond any tool point of the arm.
 
-class ToolControls(NamedTuple):
-    """The controls of the tool of an arm: its pose by numbers, and the branches to choose from."""
+It is more while a coordinate exceeds it, typed in another frame.
+"""
 
-    form: PoseForm
-    branches: BranchList
+STEP, DECIMALS = 1.0, 1
+"""[mm, deg] Step of the numbers, and their decimals."""
+
+COLOURS: tuple[Colour, ...] = (
+    *((47, 128, 237), (124, 77, 219), (0, 150, 136), (216, 67, 121)),
+    *((202, 138, 4), (14, 116, 144), (154, 52, 18), (100, 116, 139)),
+)
+"""Colours of the branches in their order, which colour-blind people can distinguish."""
+
+HEADINGS = ("branch", "off by", "path", "singular")
+
+NOTHING_LOST = "nothing"
+
+INTERVAL = 1.0
+"""Time [s] between two updates while the arm moves.
+
+One update takes longer than several frames. The first one, which loads the engine of the collision
+checks, waits as long, so that it takes no time from the first picture.
+"""
+
+Find = Callable[[State], tuple[BranchOption, ...]]
+"""Returns the option for each branch in a state."""
 
 
 class Panel:
@@ -79,14 +117,13 @@ class Panel:
         listen(drive, lambda: GESTURES[drive.value][0])
         self._readout = self._gui.add_html("")
         self._numbered: tuple[State, PoseDisplay | None] | None = None
-        self._tool: ToolControls | None = None
+        self._form: PoseForm | None = None
         if robot.arm is not None:
             with self._gui.add_folder("Pose by numbers"):
-                form = PoseForm(self._gui, robot.arm, listen, state)
+                self._form = PoseForm(self._gui, robot.arm, listen, state)
             with self._gui.add_folder("Branches", expand_by_default=False):
                 names = robot.arm.kinematics.branches
-                branches = BranchList(self._gui, names, find, listen, state)
-            self._tool = ToolControls(form, branches)
+                self._branches = BranchList(self._gui, names, find, listen, state)
 
     def follow(self, state: State, now: float, *, caught_up: bool) -> None:
         """Show ``state`` at time ``now`` [s].
@@ -94,19 +131,19 @@ class Panel:
         ``caught_up`` means that ``state`` includes every command that was sent. Without it the
         controls stay as they are, so that an older state never moves a slider that a person drags.
         """
-        if self._tool is not None:
-            self._tool.form.follow(state)
+        if self._form is not None:
+            self._form.follow(state)
         if now - self._shown_at < READOUT_INTERVAL:
             return
         self._shown_at = now
         if caught_up:
             self._set_controls(state)
         self._show_numbers(state)
-        if self._tool is not None:
-            self._tool.branches.follow(state, now)
+        if self._form is not None:
+            self._branches.follow(state, now)
 
     def _show_numbers(self, state: State) -> None:
-        display, arm = None if self._tool is None else self._tool.form.display, self._robot.arm
+        display, arm = None if self._form is None else self._form.display, self._robot.arm
         # At rest the state stays the same object, and its numbers need no work.
         if self._numbered is not None and all(map(is_, self._numbered, (state, display))):
             return
@@ -122,8 +159,8 @@ class Panel:
             set_slider(slider, factor * float(value))
         if self._gripper is not None:
             set_slider(self._gripper, self._opening(state.gripper_goal))
-        if self._tool is not None:
-            self._tool.form.set_controls(state)
+        if self._form is not None:
+            self._form.set_controls(state)
 
     def _joint(self, axis: int, state: State, listen: Listen) -> viser.GuiSliderHandle[float]:
         limits, factor = self._model.limits, self._per_si[axis]
@@ -171,3 +208,186 @@ class Panel:
     def _finger_angle(self, opening: float) -> float:
         fingers = self._model.gripper
         return fingers.closed + opening / 100.0 * (fingers.opened - fingers.closed)
+
+
+class PoseForm:
+    """The form of the tool pose: tool and priority, frame, and numbers to type.
+
+    The numbers stay until a person changes them or copies the present pose.
+    """
+
+    def __init__(self, gui: viser.GuiApi, arm: MountedArm, listen: Listen, state: State) -> None:
+        """Add the controls to ``gui``. They show ``state`` first."""
+        self._arm, self._priorities = arm, arm.kinematics.priorities
+        self._state = state
+        self._tool = gui.add_dropdown(
+            "Tool",
+            tuple(arm.tools),
+            initial_value=state.tool,
+            hint="The frame of the gizmo, these numbers and the read-out",
+        )
+        listen(self._tool, lambda: cmd.Tool(self._tool.value))
+        self._priority = gui.add_dropdown(
+            "Priority",
+            tuple(name for name, _ in self._priorities.values()),
+            initial_value=self._priorities[state.priority][0],
+            hint="Which part of the target is kept when the arm cannot satisfy all of it",
+        )
+        listen(self._priority, lambda: cmd.SetPriority(self._chosen_priority()))
+        self._meaning = gui.add_html(self._hint(state.priority))
+        self._frame = gui.add_dropdown(
+            "Frame",
+            (SHOULDER, BASE),
+            initial_value=SHOULDER,
+            hint="Of the numbers here and above: {S} is where axes 1 and 2 cross, base is the "
+            "frame of the robot on the table",
+        )
+        self.display = self._chosen()
+        self._position = gui.add_vector3(
+            "x, y, z", (0.0, 0.0, 0.0), step=STEP, hint="Tool position [mm] in this frame"
+        )
+        self._angles = gui.add_vector3(
+            "r, p, y",
+            (0.0, 0.0, 0.0),
+            min=(-180.0,) * 3,
+            max=(180.0,) * 3,
+            step=STEP,
+            hint="Roll, pitch and yaw [°] in this frame; pitch above 0 points down",
+        )
+        self._position.precision = self._angles.precision = DECIMALS
+        self._fill(forward(self._arm.chain_to(state.tool), state.goal))
+        self._frame.on_update(self._change_display)
+        # viser shows the label of a row as the name of the pose, and each button by its own text.
+        copy = gui.add_button("Copy current", hint="Fills in the present pose of the tool")
+        copy.on_click(self._copy)
+        go = gui.add_button("Go to pose", hint="Or to the nearest possible pose")
+        listen(go, lambda: cmd.Pose(self.display.pose(self._position.value, self._angles.value)))
+
+    def follow(self, state: State) -> None:
+        """Remember ``state``, whose pose can be copied."""
+        self._state = state
+
+    def set_controls(self, state: State) -> None:
+        """Show the tool and the priority of ``state``."""
+        set_value(self._tool, state.tool)
+        set_value(self._priority, self._priorities[state.priority][0])
+        meaning = self._hint(state.priority)
+        if meaning != self._meaning.content:
+            self._meaning.content = meaning
+
+    def _hint(self, priority: Priority) -> str:
+        hint = escape(self._priorities[priority][1])
+        return f"<div class='k450'><p class='hint'>{hint}</p></div>"
+
+    def _chosen_priority(self) -> Priority:
+        chosen = self._priority.value
+        return next(priority for priority, (name, _) in self._priorities.items() if name == chosen)
+
+    def _chosen(self) -> PoseDisplay:
+        return PoseDisplay(self._frame.value, self._arm.T_base_shoulder)
+
+    # These callbacks are coroutines, because viser calls only those in the order of the messages.
+
+    async def _change_display(self, _: viser.GuiEvent[Any]) -> None:
+        """Convert the numbers to the chosen frame."""
+        T = self.display.pose(self._position.value, self._angles.value)
+        self.display = self._chosen()
+        self._fill(T)
+
+    async def _copy(self, event: viser.GuiEvent[Any]) -> None:
+        if event.client_id is not None:
+            state = self._state
+            self._fill(forward(self._arm.chain_to(state.tool), state.q))
+
+    def _fill(self, T: FloatArray) -> None:
+        """Show the pose ``T`` (4, 4) in {S}."""
+        position, angles = map(_rounded, self.display.numbers(T))
+        # The page sends all three numbers when one is edited, so each must be allowed.
+        end = max(MAX_TYPED_POSITION, *(abs(x) + STEP for x in position))
+        self._position.min, self._position.max = (-end, -end, -end), (end, end, end)
+        set_value(self._position, position)
+        set_value(self._angles, angles)
+
+
+def _rounded(numbers: list[float]) -> tuple[float, ...]:
+    return tuple(round(number, DECIMALS) + 0.0 for number in numbers)
+
+
+class BranchList:
+    """The branches to choose from, with the outcome and cost of each.
+
+    A person takes a branch by a button below the table. The page shows the arm on the branch whose
+    row is under the pointer (``static/scene/branches.js``).
+    """
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        branches: Sequence[AnyBranch],
+        find: Find,
+        listen: Listen,
+        state: State,
+    ) -> None:
+        """Add the controls to the open folder of ``gui``.
+
+        ``find``: returns the option for each of ``branches`` in a state. ``state``: shown first.
+        """
+        self._find = find
+        self._seen: State | None = None
+        self._seen_at = math.nan
+        self._table = gui.add_html(_rows((), state.branch))
+        take = gui.add_button_group(
+            "Take",
+            tuple(map(str, branches)),
+            hint="Moves the arm to this branch; the target of the tool stays the same",
+        )
+        listen(take, lambda: cmd.Branch(name=take.value))
+
+    def follow(self, state: State, now: float) -> None:
+        """Update the branches for ``state`` at time ``now`` [s].
+
+        The update is immediate while the arm is at rest. Otherwise, and before the first one, at
+        least INTERVAL passes.
+        """
+        if math.isnan(self._seen_at):
+            self._seen_at = now
+        rests = self._seen is not None and not state.moving
+        if state is self._seen or not (rests or now - self._seen_at >= INTERVAL):
+            return
+        self._seen, self._seen_at = state, now
+        rows = _rows(self._find(state), state.branch)
+        if rows != self._table.content:
+            self._table.content = rows
+
+
+def _rows(options: tuple[BranchOption, ...], now: AnyBranch) -> str:
+    """Return the table as HTML, with one row per branch and the branch ``now`` marked."""
+    head = "".join(f"<th>{escape(heading)}</th>" for heading in HEADINGS)
+    rows = "".join(
+        f"<tr data-branch='{choice.metrics.branch}'"
+        f"{' aria-current=true' if choice.metrics.branch == now else ''}>"
+        f"<th><i style='background:rgb{colour}'></i>{choice.metrics.branch}</th>"
+        + "".join(f"<td>{escape(cell)}</td>" for cell in cells_of(choice))
+        + "</tr>"
+        for choice, colour in zip(options, COLOURS, strict=False)
+    )
+    return (
+        f"<div class='k450'><table class='branches'><thead><tr>{head}</tr></thead>"
+        f"<tbody>{rows}</tbody></table></div>"
+    )
+
+
+def cells_of(choice: BranchOption) -> tuple[str, str, str]:
+    """Return the loss, the path length and time, and the smallest singular value of a branch."""
+    metrics = choice.metrics
+    if choice.refusal:
+        return choice.refusal.partition(" exclude")[0].removeprefix("The "), "–", "–"
+    lost = []
+    if metrics.position_error > POSITION_WORTH_TELLING:
+        lost.append(f"{short(1e3 * metrics.position_error)} mm")
+    if metrics.rotation_error > ANGLE_WORTH_TELLING:
+        lost.append(f"{short(math.degrees(metrics.rotation_error))}°")
+    if choice.contact is not None:
+        lost.append(" meets ".join(map(part, choice.contact.parts)))
+    path = f"{degrees(metrics.distance, 0)}, {metrics.time:.1f} s"
+    return ", ".join(lost) or NOTHING_LOST, path, f"{metrics.smallest_singular_value:.3f}"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import logging
+import threading
 import time
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import viser
@@ -22,17 +23,14 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras, initial_camera, scale_of
 from katana450.server.view.controls import GestureGate
-from katana450.server.view.display_options import add_views
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.paint import PaintNodes, Tint
-from katana450.server.view.panel import Panel
+from katana450.server.view.panel import READOUT_INTERVAL, Panel
 from katana450.server.view.panel_folder import AddFolders
 from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scenery import Scenery
-from katana450.server.view.view_updater import ViewUpdater
-from katana450.server.viser_bridge.presets import Preset
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
@@ -51,20 +49,13 @@ GOAL, SETPOINT = "/ghost", "/setpoint"
 
 OPACITY = {GOAL: 0.35, SETPOINT: 0.2}
 
+FRAME_RATE = 60.0
+"""[Hz] Maximum rate of updates of the scene."""
+
 GHOST_FROM = np.deg2rad(0.2)
 """Distance [rad] of a joint from its goal, or its setpoint, above which a ghost is shown."""
 
-
-class Additions(NamedTuple):
-    """Parts of a view beside the robot.
-
-    Attributes:
-        layers: Layers of extensions, which the robot can have.
-        meshes: The meshes of scene objects.
-    """
-
-    layers: tuple[ViewLayer, ...]
-    meshes: Meshes
+log = logging.getLogger(__name__)
 
 
 class ToolNodes:
@@ -110,6 +101,67 @@ class ToolNodes:
         return T_base_shoulder[:3, :3] @ p + T_base_shoulder[:3, 3]
 
 
+class ViewUpdater:
+    """Shows new snapshots, up to a maximum number per second. The base shows nothing.
+
+    Attributes:
+        failed: set when the view has ended with an error.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, state_publisher: StatePublisher, frame_rate: float
+    ) -> None:
+        """Prepare the thread; ``frame_rate``: maximum number of updates per second [Hz]."""
+        self._server = server
+        self._state_publisher = state_publisher
+        self._interval = 1.0 / frame_rate
+        self._stopping = threading.Event()
+        self.failed = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="view", daemon=True)
+
+    def start(self) -> None:
+        """Start to follow the control loop, with the panel."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and wait for it."""
+        self._stopping.set()
+        self._state_publisher.wake()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Send the changes in ``snapshot`` to every browser."""
+
+    def show_panel(self, snapshot: Snapshot) -> None:
+        """Send what may follow the scene: it does not delay the picture of a drag."""
+
+    def _run(self) -> None:
+        try:
+            self._follow()
+        except Exception:
+            log.exception("The view met an error.")
+            self.failed.set()
+
+    def _follow(self) -> None:
+        shown = self._state_publisher.snapshot
+        settled = True
+        while not self._stopping.is_set():
+            # The read-out has a longer interval and needs one more update after the last change.
+            snapshot = self._state_publisher.wait_for_change(
+                shown, 0.5 if settled else READOUT_INTERVAL, self._stopping.is_set
+            )
+            settled = snapshot is shown
+            shown = snapshot
+            due = time.perf_counter() + self._interval
+            self.show(snapshot)
+            # The scene is on its way meanwhile.
+            self._state_publisher.wait_for_command(snapshot, self._interval / 2)
+            self.show_panel(snapshot)
+            # Motion is shown at the frame rate, the effect of a command immediately.
+            self._state_publisher.wait_for_command(snapshot, due - time.perf_counter())
+
+
 class View(ViewUpdater):
     """Shows each new snapshot to every browser; submits what people do."""
 
@@ -121,8 +173,8 @@ class View(ViewUpdater):
         gestures: GestureGate,
         last_ticket: Callable[[], int],
         session: Session,
-        frame_rate: float,
-        additions: Additions,
+        layers: Sequence[ViewLayer],
+        meshes: Meshes,
     ) -> None:
         """Build the scene.
 
@@ -133,20 +185,19 @@ class View(ViewUpdater):
             gestures: The path of gestures to the arm.
             last_ticket: Returns the ticket of the newest command.
             session: The session, which has the branch options and the environment of objects.
-            frame_rate: Maximum number of updates per second [Hz].
-            additions: What is shown beside the robot.
+            layers: Layers of extensions, which the robot can have.
+            meshes: The meshes of scene objects.
 
         Raises:
             KatanaError: A layer cannot be shown.
         """
-        super().__init__(server, state_publisher, frame_rate)
+        super().__init__(server, state_publisher, FRAME_RATE)
         server.gui.set_panel_label(title(robot.name))
         self._robot = robot
         self._gestures, self._choices = gestures, session.choices
         self._last_ticket = last_ticket
         props = load_props()
-        parts = (server, robot, session, props, gestures, additions.meshes)
-        self._scenery = Scenery(*parts, layers=additions.layers)
+        self._scenery = Scenery(server, robot, session, props, gestures, meshes, layers)
         self._paint = PaintNodes(server, self._scenery.arm)
         shown = None if robot.arm is None else props
         self._tint = Tint(server, robot, self._scenery.arm.path, shown)
@@ -174,13 +225,10 @@ class View(ViewUpdater):
             self._ghost(GOAL, GHOST_COLOURS[Status.OK])
             self._panel = Panel(server, self._robot, gestures, self._choices, snapshot.state)
             self._folders = tuple(folders())
-            add_views(server.gui, self._look_from)
+            self._cameras.add_buttons(server.gui, lambda: self._state_publisher.snapshot.state)
             # At the end of the panel, because the element takes an empty line.
             server.gui.add_html(style())
         self.show_panel(snapshot)
-
-    def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
-        self._cameras.give(client, preset, self._state_publisher.snapshot.state)
 
     def show(self, snapshot: Snapshot) -> None:
         """Send the changes of the scene in ``snapshot`` to every browser."""
