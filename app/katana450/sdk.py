@@ -52,10 +52,10 @@ if TYPE_CHECKING:
     from katana450.server.service.identity import Identity as Identity
     from katana450.server.service.participants import Participant as Participant
     from katana450.server.service.runner import RequestHandler as RequestHandler
+    from katana450.server.view.layer import FolderContext as FolderContext
     from katana450.server.view.layer import LayerContext as LayerContext
+    from katana450.server.view.layer import PanelFolder as PanelFolder
     from katana450.server.view.layer import ViewLayer as ViewLayer
-    from katana450.server.view.panel_folder import FolderContext as FolderContext
-    from katana450.server.view.panel_folder import PanelFolder as PanelFolder
     from katana450.server.viser_bridge.presets import Preset as Preset
     from katana450.server.web.http_api import RouteContext as RouteContext
     from katana450.server.web.listen import listen as listen

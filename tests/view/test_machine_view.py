@@ -28,8 +28,8 @@ from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.hub import Hub
+from katana450.server.view.layer import FolderContext, PanelFolder
 from katana450.server.view.panel import Panel
-from katana450.server.view.panel_folder import FolderContext, PanelFolder
 from katana450.server.view.readout import joint_page
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.view import View

@@ -19,8 +19,7 @@ from katana450.assembly.robot_session import find_robot
 from katana450.extension import ServerFacts, load, results
 from katana450.server.service.arm_handle import ArmHandle, Nodes
 from katana450.server.service.command_gate import guarded
-from katana450.server.view.layer import ViewLayer
-from katana450.server.view.panel_folder import FolderContext, PanelFolder
+from katana450.server.view.layer import FolderContext, PanelFolder, ViewLayer
 from katana450.server.view.view import View
 
 NODES = "katana450.extensions.export.vrml.vrml_nodes:VrmlNodes"

@@ -8,7 +8,6 @@ import numpy as np
 import viser
 
 from katana450.arm.control.state.state import State
-from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
@@ -44,9 +43,6 @@ INSET = (0.99, 0.99, 1.0)
 
 FLAT = 5e-3
 """Radius [m] below which a puddle is a drop, whose height shrinks with its radius."""
-
-TWIST = 2.4
-"""Turn [rad] from puddle to puddle, which hides that all have the same shape."""
 
 
 class WaterPart(NamedTuple):
@@ -89,8 +85,7 @@ def parts_of(water: Water, water_environment: WaterEnvironment) -> list[WaterPar
     for number, puddle in enumerate(water.puddles):
         corners, faces = blob()
         scale = puddle.radius, puddle.radius, min(puddle.radius / FLAT, 1.0)
-        corners = (corners * scale) @ so3.rotation_z(TWIST * number).T + puddle.at
-        parts.append(WaterPart(f"puddle{number}", corners, faces, ON_TABLE))
+        parts.append(WaterPart(f"puddle{number}", corners * scale + puddle.at, faces, ON_TABLE))
     return parts
 
 

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import viser
@@ -142,15 +143,15 @@ class Gizmo:
                 "pitch": self._ring(server, "/target/move/pitch", (True, False, True)),
                 "roll": self._ring(server, "/target/move/roll", (False, True, True)),
             }
-            self._rings["pitch"].on_update(self._pitched)
-            self._rings["roll"].on_update(self._rolled)
+            self._rings["pitch"].on_update(partial(self._ring_turned, "pitch"))
+            self._rings["roll"].on_update(partial(self._ring_turned, "roll"))
         else:
             several = arm.chain.n != PITCHING
             self._rings = {"turn": self._ring(server, "/target/move/turn", (True, several, True))}
             self._rings["turn"].on_update(self._turned)
         if arm.kinematics.turns_elbow:
             self._rings["elbow"] = self._ring(server, "/target/elbow", (False, True, True))
-            self._rings["elbow"].on_update(self._elbow_turned)
+            self._rings["elbow"].on_update(partial(self._ring_turned, "elbow"))
 
     @property
     def is_five_axis(self) -> bool:
@@ -268,24 +269,15 @@ class Gizmo:
         actor = self._held.get(part)
         return actor is not None and self._gestures.is_current(actor)
 
-    async def _pitched(self, event: viser.TransformControlsEvent) -> None:
+    async def _ring_turned(self, ring: str, event: viser.TransformControlsEvent) -> None:
+        """Send the turn of a ``ring`` that turns about one axis alone."""
         actor = self._gestures.actor(event.client_id)
-        turn = self._turning(event, actor, "pitch")
-        if turn is not None:
-            command = Turn(turn.pitch + turn.turned, turn.roll)
+        turn = self._turning(event, actor, ring)
+        if turn is not None and ring != "elbow":
+            pitch, roll = (turn.turned if ring == name else 0.0 for name in ("pitch", "roll"))
+            command = Turn(turn.pitch + pitch, turn.roll + roll)
             self._submit(event, actor, command, (command.pitch, command.roll))
-
-    async def _rolled(self, event: viser.TransformControlsEvent) -> None:
-        actor = self._gestures.actor(event.client_id)
-        turn = self._turning(event, actor, "roll")
-        if turn is not None:
-            command = Turn(turn.pitch, turn.roll + turn.turned)
-            self._submit(event, actor, command, (command.pitch, command.roll))
-
-    async def _elbow_turned(self, event: viser.TransformControlsEvent) -> None:
-        actor = self._gestures.actor(event.client_id)
-        turn = self._turning(event, actor, "elbow")
-        if turn is not None and turn.turned != turn.sent:
+        elif turn is not None and turn.turned != turn.sent:
             with suppress(KatanaError):
                 self._gestures.submit(TurnElbow(turn.turned - turn.sent), actor)
                 turn.sent = turn.turned

@@ -42,12 +42,9 @@ def page(arm: MountedArm, state: State, display: PoseDisplay) -> str:
         "<div class='k450'><table class='pose'><thead><tr>"
         f"<th>{escape(state.tool)} in {display.frame_name}</th>"
         f"<th>now</th><th>goal</th><th></th></tr></thead><tbody>{rows}</tbody></table>"
-        f"<table class='at-once'>{_row('limit', 'nearest limit', limit)}</table></div>"
+        "<table class='at-once'><tr><th>nearest limit</th>"
+        f"<td data-now='limit'>{escape(limit)}</td></tr></table></div>"
     )
-
-
-def _row(key: str, name: str, value: str) -> str:
-    return f"<tr><th>{escape(name)}</th><td data-now='{key}'>{escape(value)}</td></tr>"
 
 
 def joint_page(joints: JointSet, labels: Sequence[str], state: State) -> str:

@@ -24,10 +24,9 @@ from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras, initial_camera, scale_of
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.gizmo import Gizmo
-from katana450.server.view.layer import ViewLayer
+from katana450.server.view.layer import AddFolders, ViewLayer
 from katana450.server.view.paint import PaintNodes, Tint
 from katana450.server.view.panel import READOUT_INTERVAL, Panel
-from katana450.server.view.panel_folder import AddFolders
 from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scenery import Scenery

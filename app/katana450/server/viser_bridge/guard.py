@@ -153,18 +153,12 @@ class Guard:
             return "only the value of a control can be changed"
         value = message.updates["value"]
         match handle:
-            case viser.GuiButtonHandle():
-                return None if isinstance(value, bool) else "the value of a button is not a boolean"
-            case viser.GuiCheckboxHandle():
-                return None if isinstance(value, bool) else "the value of a box is not a boolean"
+            case viser.GuiButtonHandle() | viser.GuiCheckboxHandle():
+                return None if isinstance(value, bool) else "the value is not a boolean"
             case viser.GuiDropdownHandle() | viser.GuiButtonGroupHandle():
                 return None if value in handle.options else "the value is not in the list"
             case viser.GuiSliderHandle() | viser.GuiNumberHandle():
                 return _range([value], [handle.min], [handle.max])
-            case viser.GuiRgbHandle():
-                if len(value) != 3:
-                    return "a colour must have three numbers"
-                return _range(value, [0] * 3, [255] * 3)
             case viser.GuiVector3Handle():
                 if len(value) != 3:
                     return "a vector must have three numbers"

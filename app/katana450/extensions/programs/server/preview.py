@@ -34,7 +34,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.water.flow import Water
 from katana450.maths.water.motion import MotionWithWater
-from katana450.server.view.panel_folder import FolderContext
+from katana450.server.view.layer import FolderContext
 from katana450.server.view.scene import Colour, GhostNodes, Window
 from katana450.server.view.scene_objects import ObjectShape
 

@@ -16,7 +16,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs.server.preview import SAME_PLACE, GhostScene
 from katana450.extensions.recording.playback.rows import RecordedMoment, still_flying
 from katana450.server.service.hub import Hub
-from katana450.server.view.panel_folder import FolderContext
+from katana450.server.view.layer import FolderContext
 from katana450.server.view.scene import Colour, GhostNodes, Window, node_name
 from katana450.server.viser_bridge.gestures import Gestures
 
