@@ -1,7 +1,6 @@
 // Who is connected, for admins: a list with buttons that disconnect.
 import { element, first, styled } from "../dom.js";
 import { html } from "../instruments/shape.js";
-import { clock } from "../page/words.js";
 
 const EVERY = 1000; // ms between two queries while the list is open
 const CONTENT = `
@@ -16,13 +15,11 @@ const CONTENT = `
 
 /** @param {Api.ConnectedPerson} person */
 function about(person) {
-  const { role, drives, asks, program, connections, kept_out: out, link } = person;
-  const addresses = [...new Set(connections.map(({ address }) => address))].join(", ");
+  const { role, drives, addresses, kept_out: out, link } = person;
   return [
     role,
-    drives && (program ? `runs ${program}` : "drives"),
-    asks && "asks for the arm",
-    connections.length > 0 && `connected from ${addresses} since ${clock(new Date(connections[0].since), { timeStyle: "short" })}`,
+    drives && "drives",
+    addresses.length > 0 && `connected from ${[...new Set(addresses)].join(", ")}`,
     link && `link ${link.slice(0, 6)}`,
     out !== null && `disconnected for ${Math.ceil(out / 60)} min`,
   ].filter(Boolean).join(" · ");

@@ -32,7 +32,7 @@ declare namespace Api {
   interface ClearStop { do: "clear_stop"; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
   interface ConnectedPerson { person: number; name: string; role: string; link: string | null; you: boolean;
-    drives: boolean; asks: boolean; program: string | null; kept_out: number | null; connections: PersonConnection[]; }
+    drives: boolean; kept_out: number | null; addresses: string[]; }
   interface Decline { do: "decline"; id?: number | string | null; revocations?: number | null; made?: number | null;
     to: number; }
   interface Done { is: "done"; id?: number | string | null; ticket?: number | null; outcome?: string | null;
@@ -105,7 +105,6 @@ declare namespace Api {
   interface PartRefusal { part: number; command: string; why: string; }
   interface Pause { do: "pause"; id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface People { is: "people"; id?: number | string | null; people: ConnectedPerson[]; }
-  interface PersonConnection { name: string; address: string; since: string; }
   interface Place { do: "place"; id?: number | string | null; revocations?: number | null; made?: number | null;
     name: string; T?: number[][] | null; near?: [number, number] | null; frame?: Frame; shape?: Shape | null;
     size?: number[] | null; mesh?: string | null; can_be_held?: boolean | null; zone?: Zone | null;

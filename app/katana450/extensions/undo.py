@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import threading
 from argparse import Namespace
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Any
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.scene_objects import SceneObject, named, same
-from katana450.arm.control.state.state import Outcome, State, Verdict
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
 from katana450.server.service.hub import Hub
@@ -65,21 +63,16 @@ class UndoHistory:
         self._changes: tuple[Change, ...] = ()
         # What was undone since the last change, with the inverses of the undoing.
         self._undone: tuple[Change, ...] = ()
-        # Number of commands so far.
-        self._count = 0
-        # Outcomes are reported in the thread of the pipe.
-        self._lock = threading.Lock()
+        self.undoes = False
+        """Whether the present command undoes a change or repeats one, and is no change itself."""
 
     def note(self, command: cmd.Command, actor: Actor, state: State, caught_up: bool) -> None:
         """Note what ``command`` of ``actor``, delivered in ``state``, changes.
 
         ``caught_up``: whether ``state`` includes every earlier command.
         """
-        with self._lock:
-            self._note(state, command, actor, caught_up=caught_up)
-
-    def _note(self, state: State, command: cmd.Command, actor: Actor, *, caught_up: bool) -> None:
-        self._count += 1
+        if self.undoes:
+            return
         if isinstance(command, cmd.ReplaceScene):
             self._changes = self._undone = ()
         inverse = _inverse(state, command)
@@ -99,11 +92,6 @@ class UndoHistory:
             self._changes = ()
         elif not isinstance(command, cmd.EndDrag):
             self._changes = (*self._changes, change)[-MAX_CHANGES:]
-
-    @property
-    def stacks(self) -> tuple[tuple[Change, ...], tuple[Change, ...]]:
-        """The changes that can be undone, and those that were undone."""
-        return self._changes, self._undone
 
     def changes(self, key: str, revocations: int, *, redo: bool = False) -> tuple[Change, ...]:
         """Return the changes that the participant of ``key`` can undo or redo, the newest first."""
@@ -144,44 +132,17 @@ class UndoHistory:
                 command = cmd.PlaceObject(replace(before, appearance=now.appearance))
         return changes[0], command
 
-    def back(self, change: Change, command: cmd.Command, state: State) -> Change | None:
-        """Return the change by which ``command``, which undoes ``change``, is undone in ``state``.
-
-        No later command continues it.
-        """
-        inverse = _inverse(state, command)
-        return None if inverse is None else replace(change, inverse=inverse[1], at=-math.inf)
-
-    def move(
-        self,
-        change: Change,
-        back: Change | None,
-        before: tuple[tuple[Change, ...], tuple[Change, ...]],
-        outcome: Future[Outcome],
-        *,
-        redo: bool,
-    ) -> None:
-        """Remove ``change`` from the stacks ``before``, and add ``back`` to the other one.
-
-        Its inverse was delivered. The stacks return if the arm refuses it, unless another command
-        was given meanwhile. ``outcome``: that of the inverse.
-        """
-        with self._lock:
-            changes, undone = (tuple(c for c in stack if c is not change) for stack in before)
-            more = () if back is None else (back,)
-            if redo:
-                changes = (*changes, *more)[-MAX_CHANGES:]
-            else:
-                undone = (*undone, *more)
-            count, self._changes, self._undone = self._count, changes, undone
-
-        def restore(outcome: Future[Outcome]) -> None:
-            refused = not outcome.cancelled() and outcome.result().verdict is Verdict.REFUSED
-            with self._lock:
-                if refused and self._count == count:
-                    self._changes, self._undone = before
-
-        outcome.add_done_callback(restore)
+    def move(self, change: Change, back: Change | None, *, redo: bool) -> None:
+        """Remove ``change``, whose inverse was delivered, and add ``back`` to the other stack."""
+        self._changes, self._undone = (
+            tuple(other for other in stack if other is not change)
+            for stack in (self._changes, self._undone)
+        )
+        more = () if back is None else (back,)
+        if redo:
+            self._changes = (*self._changes, *more)[-MAX_CHANGES:]
+        else:
+            self._undone = (*self._undone, *more)
 
 
 def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | None:
@@ -247,11 +208,17 @@ class UndoRequests(RequestHandler):
         with gate.lock:
             arm, revocations = gate.check_runs(), gate.revocations
             gate.check_current(actor)
-            before = history.stacks
             change, command = history.inverse(actor.key, revocations, arm.state, redo=redo)
-            back = history.back(change, command, arm.state) if arm.caught_up else None
-            ticket = gate.submit(command, actor)
-            history.move(change, back, before, arm.outcome(ticket), redo=redo)
+            back, inverse = None, _inverse(arm.state, command) if arm.caught_up else None
+            if inverse is not None:
+                # No later command continues it.
+                back = replace(change, inverse=inverse[1], at=-math.inf)
+            history.undoes = True
+            try:
+                ticket = gate.submit(command, actor)
+            finally:
+                history.undoes = False
+            history.move(change, back, redo=redo)
         return answers.Done(ticket=ticket, revocations=revocations)
 
     def page_status(self, participant: Participant) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 from argparse import Namespace
-from datetime import UTC, datetime
 
 from katana450.arm.control.lease import Role
 from katana450.errors import InputError, LeaseError
@@ -100,9 +99,7 @@ class PeopleRequests(RequestHandler):
         *,
         you: bool,
     ) -> answers.ConnectedPerson:
-        hub, people, session = self.hub, self._people, identity.session
-        program = hub.gate.program
-        owns = program is not None and session_of(program.owner) == session
+        people, session = self._people, identity.session
         kept_out = people.kept_out(session)
         return answers.ConnectedPerson(
             person=number,
@@ -110,11 +107,9 @@ class PeopleRequests(RequestHandler):
             role=identity.role.value,
             link=None if people.links is None else session,
             you=you,
-            drives=session in hub.drivers,
-            asks=any(session_of(other.key) == session for other in hub.lease.waiting),
-            program=program.person.name if program is not None and owns else None,
+            drives=session in self.hub.drivers,
             kept_out=round(kept_out, 1) if kept_out else None,
-            connections=tuple(map(self._connection, connections.get(session, ()))),
+            addresses=tuple(connection.address for connection in connections.get(session, ())),
         )
 
     def _name(self, identity: Identity) -> str:
@@ -126,12 +121,6 @@ class PeopleRequests(RequestHandler):
             if participant is not None:
                 return participant.person.name
         return identity.name or "Somebody"
-
-    def _connection(self, connection: Connection) -> answers.PersonConnection:
-        participant = self.hub.participant(connection.key)
-        name = connection.identity.name if participant is None else participant.person.name
-        since = datetime.fromtimestamp(connection.since, UTC).isoformat(timespec="seconds")
-        return answers.PersonConnection(name=name or "", address=connection.address, since=since)
 
 
 def _report(participant: Participant, why: str) -> None:

@@ -455,20 +455,6 @@ class Loop(Answer, frozen=True, kw_only=True):
     lost: int
 
 
-class PersonConnection(msgspec.Struct, frozen=True, kw_only=True):
-    """An open connection of a person.
-
-    Attributes:
-        name: Name of the page or program that others see.
-        address: Address of the client, as the server sees it.
-        since: Time at which it was opened, in UTC, in ISO 8601.
-    """
-
-    name: str
-    address: str
-    since: str
-
-
 class ConnectedPerson(msgspec.Struct, frozen=True, kw_only=True):
     """A person with all connections: everybody who uses one link; without links, one browser.
 
@@ -479,10 +465,8 @@ class ConnectedPerson(msgspec.Struct, frozen=True, kw_only=True):
         link: Number of the access link; null without links.
         you: Whether this is the person who asks.
         drives: Whether the person holds the lease, or owns the program that holds it.
-        asks: Whether the person asks for the lease.
-        program: Name of the running program that the person owns; null without one.
         kept_out: Time [s] for which the person is kept out; null unless kicked.
-        connections: Open connections, the oldest first.
+        addresses: Address of each open connection, as the server sees it, the oldest first.
     """
 
     person: int
@@ -491,10 +475,8 @@ class ConnectedPerson(msgspec.Struct, frozen=True, kw_only=True):
     link: str | None
     you: bool
     drives: bool
-    asks: bool
-    program: str | None
     kept_out: float | None
-    connections: tuple[PersonConnection, ...]
+    addresses: tuple[str, ...]
 
 
 class People(Answer, frozen=True, kw_only=True):

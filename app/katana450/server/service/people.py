@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -39,14 +38,12 @@ class Connection:
         identity: Identity of the client.
         address: Host address of the client, as the server sees it.
         key: Key of its participant; empty without one.
-        since: Time at which it was opened [s since the epoch].
         kicked: Set when an admin ends the connection.
     """
 
     identity: Identity
     address: str
     key: str = ""
-    since: float = field(default_factory=time.time)
     kicked: asyncio.Event = field(default_factory=asyncio.Event)
 
 
