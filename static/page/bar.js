@@ -88,7 +88,7 @@ export class Bar {
     else head(status.headline, status.end);
     const moment = status.stopped_at ? `${time(status.stopped_at)}:` : "";
     const cause = status.stopped ? [moment, status.stopped] : [proven];
-    const words = [status.taken, status.why, ...cause, status.until, status.cautions].filter(Boolean).join(" ");
+    const words = [status.why, ...cause, status.until, status.cautions].filter(Boolean).join(" ");
     text("why", this.#named(words).replace(`started by ${status.name} `, "started by you "));
   }
 

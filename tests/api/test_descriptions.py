@@ -120,7 +120,7 @@ def test_messages_of_a_server_fit_the_schemas(local: VirtualServer) -> None:
                 {"do": "query", "at": topic}
                 for topic in ("state", "arm", "objects", "world", "loop")
             ),
-            *({"do": "query", "at": topic} for topic in ("links", "branches", "program_plan")),
+            *({"do": "query", "at": topic} for topic in ("branches", "program_plan")),
             {"do": "get", "node": "tcp", "field": "translation"},
             {"do": "heartbeat"},
             {"do": "list_people"},

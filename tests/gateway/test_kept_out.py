@@ -16,8 +16,7 @@ from katana450.errors import InputError
 from katana450.server.service import people as people_module
 from katana450.server.service import status
 from katana450.server.service.identity import Identity
-from katana450.server.service.known_pages import MAX_NAME, MAX_PAGES, renamed
-from katana450.server.service.participants import actor_of
+from katana450.server.service.participants import MAX_NAME, MAX_PAGES, actor_of, renamed
 from katana450.server.service.people import Connection
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.authenticator import KICKED

@@ -23,12 +23,11 @@ from katana450.errors import LeaseError
 from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service import status
-from katana450.server.service.command_gate import SETTLE_TIME
+from katana450.server.service.command_gate import SETTLE_TIME, StopRecord
 from katana450.server.service.heartbeats import MAX_ACK_AGE, LastHeartbeat, keep_alive
 from katana450.server.service.hub import TICK
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant
-from katana450.server.service.stop_state import StopRecord
 from katana450.settings import Settings
 from tests.gateway.test_hub import PAGES, Table, moves
 from tests.gateway.test_program_runner import Staged

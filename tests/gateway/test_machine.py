@@ -61,7 +61,7 @@ def test_every_link_is_where_another_program_has_it(
         np.testing.assert_allclose(state.q, q, rtol=0, atol=1e-12)
         # It gets the driven joints alone, and computes the following joints itself.
         urdf.update_cfg(dict(zip(robot.joint_group.names, q.tolist(), strict=True)))
-        poses = {link.name: link.T for link in program.query(answers.Links).links}
+        poses = robot.frames(robot.joint_values(np.array(state.q), state.gripper))
         assert set(poses) == set(urdf.link_map)
         for name, T in poses.items():
             np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)

@@ -329,23 +329,3 @@ async def numbered(owner: Control, other: Control) -> dict[str, Any]:
     (asking,) = owner.status["asking"]
     assert asking["name"] == other.status["name"]
     return dict(asking)
-
-
-@pytest.mark.parametrize("by_program", [False, True])
-async def test_former_driver_gets_the_name_of_the_new_one(
-    local: VirtualServer, by_program: bool
-) -> None:
-    driver, other = await local.control(), await local.control()
-    if by_program:
-        await run_program(driver)
-    else:
-        await driver.say("acquire")
-        await driver.wait(mine=True)
-    assert driver.status["taken"] == ""
-    await other.say("take")
-    await other.wait(mine=True, taken="")
-    await driver.wait(mine=False, taken=f"{other.status['name']} took over from you.")
-    await other.say("release_lease")
-    await driver.wait(holder=None, taken="")
-    await driver.say("acquire")
-    await driver.wait(mine=True, taken="")

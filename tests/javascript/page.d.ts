@@ -29,7 +29,7 @@ declare namespace Page {
     wait: string; problem: string | null; holder: string | null; silence_profile: string; detour: boolean;
     speed: number; paused: boolean; arm: ArmStatus | null; participants: number; revocations: number; scripts: boolean;
     pace: string; may_clear_stop: boolean; until: string; name: string; role: string; mine: boolean;
-    own_program: boolean; asked: boolean; asking: Named[]; others: Named[]; taken: string; planning: boolean;
+    own_program: boolean; asked: boolean; asking: Named[]; others: Named[]; planning: boolean;
     fraction: number; orders: Api.ProgramOrder[]; continues: [] | [string, number, number]; age: number;
     /** Names of what can be undone and redone, the newest first. */
     undo?: string[]; redo?: string[];

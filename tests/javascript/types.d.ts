@@ -6,8 +6,8 @@ declare namespace Api {
     Nudge | OperateArm | Orient | Pause | Place | Pose | Position | Preview | Program | Query | Redo | ReleaseLease |
     Remove | Rename | Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn |
     TurnElbow | Undo | Watch | Withdraw;
-  type Answer = Arm | Branches | Done | Echo | Links | Loop | Mesh | Objects | People | ProgramPlan | Refused | Scene |
-    State | Values | Welcome | World;
+  type Answer = Arm | Branches | Done | Echo | Loop | Mesh | Objects | People | ProgramPlan | Refused | Scene | State |
+    Values | Welcome | World;
   interface Arm { is: "arm"; id?: number | string | null; name: string; joints: string[]; lower: number[];
     upper: number[]; speed: number[]; acceleration: number[]; jerk: number[]; ready: number[];
     tools: Record<string, number[][]>; default_tool: string | null; gripper: [number, number, number] | null;
@@ -78,8 +78,6 @@ declare namespace Api {
     made?: number | null; wait?: number | null; }
   interface Kick { do: "kick"; id?: number | string | null; revocations?: number | null; made?: number | null;
     person: number; seconds?: number; revoke?: boolean; }
-  interface Link { name: string; T: number[][]; }
-  interface Links { is: "links"; id?: number | string | null; links: Link[]; }
   interface ListPeople { do: "list_people"; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
   interface Load { do: "load"; id?: number | string | null; revocations?: number | null; made?: number | null;
@@ -87,7 +85,7 @@ declare namespace Api {
   interface Loop { is: "loop"; id?: number | string | null; period: number; ticks: number; late_p50: number;
     late_p99: number; late_max: number; lost: number; }
   interface Margins { limit: number; axis: number; limits: number[]; smallest_singular_value: number;
-    condition_number: number | null; manipulability: number; clearance: number | null; parts: [string, string] | null; }
+    clearance: number | null; parts: [string, string] | null; }
   interface MeasuredArm { mode: string; note: string; acts: string[]; t: number; expected: number[];
     tracking_error: number; axis: number; speeds: number[] | null; round_trip: number; stop_time: number | null;
     stop_angle: number | null; stop_distance: number | null; sensors: number[]; }
@@ -126,7 +124,7 @@ declare namespace Api {
     task: string; fraction: number; seconds: number; seconds_left: number; why: string; skipped: number[];
     unattended: boolean; began: string | null; breakpoints: number[]; can_continue: boolean; }
   interface Query { do: "query"; id?: number | string | null; revocations?: number | null; made?: number | null;
-    at?: "arm" | "branches" | "links" | "loop" | "objects" | "program_plan" | "state" | "world"; }
+    at?: "arm" | "branches" | "loop" | "objects" | "program_plan" | "state" | "world"; }
   interface Redo { do: "redo"; id?: number | string | null; revocations?: number | null; made?: number | null;
     wait?: number | null; }
   interface Refused { is: "refused"; id?: number | string | null; why: string; code?: string; retry?: number | null;

@@ -39,9 +39,6 @@ MAX_STREAM_SECONDS = 60.0
 SUBJECT = ("axis", "name", "trait")
 """Attributes by which commands of one class belong to different streams."""
 
-LEASE_REQUESTS = ("requested", "withdrawn", "declined")
-"""Words of the records about the lease that tell of no change of its holder."""
-
 StreamKey = tuple[str, str, str, object]
 
 SUMMARY_INTERVAL = 10.0
@@ -50,21 +47,9 @@ SUMMARY_INTERVAL = 10.0
 MAX_SENDERS = 512
 """Maximum number of participants whose records are counted, for each kind."""
 
-SESSION = (60.0, 0.2)
-
-LIMITS = {
-    "stop": (30.0, 0.5),
-    "clear": (30.0, 0.5),
-    "lease": (60.0, 0.5),
-    "finding": (200.0, 1.0),
-    "refusal": (20.0, 0.2),
-    **dict.fromkeys(("join", "leave", "rename", "sign-in", "upload"), SESSION),
-}
-"""Records of one participant in a burst, and per second [1/s] afterwards, by kind. A flood of one
-kind leaves the others as they are."""
-
-COMMANDS = (600.0, 2.0)
-"""The same for all other kinds."""
+RATE, BURST = 0.5, 100.0
+"""Records of one participant per second [1/s], and in a burst, of each kind. A flood of one kind
+leaves the others as they are."""
 
 EVERYBODY_FACTOR = 4.0
 """Limits of all participants together, in limits of one."""
@@ -132,8 +117,7 @@ class RecordMaker:
             case LogEntry():
                 self._finding(note.what)
             case _:
-                transfer = note.kind == "lease" and note.what["lease"] not in LEASE_REQUESTS
-                if transfer or note.kind in ("stop", "leave"):
+                if note.kind in ("lease", "stop", "leave"):
                     self._streams.clear()
                 self._stopped |= note.kind == "stop"
                 self._add(note, content_of(note.what))
@@ -238,9 +222,8 @@ class RecordLimits:
     def admits(self, source: str, kind: str, t: float) -> bool:
         """Return whether a record of ``source`` is written at ``t`` [s]; count it otherwise."""
         if kind not in self._kinds:
-            burst, rate = LIMITS.get(kind, COMMANDS)
-            total = TokenBucket(EVERYBODY_FACTOR * rate, EVERYBODY_FACTOR * burst, t)
-            self._kinds[kind] = SenderBuckets(rate, burst, MAX_SENDERS, total)
+            total = TokenBucket(EVERYBODY_FACTOR * RATE, EVERYBODY_FACTOR * BURST, t)
+            self._kinds[kind] = SenderBuckets(RATE, BURST, MAX_SENDERS, total)
         if self._kinds[kind].take(source, t):
             return True
         if not self.unwritten:

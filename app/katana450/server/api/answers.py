@@ -135,8 +135,6 @@ class Margins(msgspec.Struct, frozen=True, kw_only=True):
             slides; negative beyond it.
         smallest_singular_value: Smallest singular value of the Jacobian over the characteristic
             length of the arm [1]; 0 in a singularity.
-        condition_number: Largest over smallest singular value [1]; null from 1e6, in a singularity.
-        manipulability: Product of the singular values [1] (Yoshikawa 1985); 0 in a singularity.
         clearance: Distance of the two nearest parts [m]; null where contacts are not checked.
         parts: The two nearest parts; null where contacts are not checked.
     """
@@ -145,8 +143,6 @@ class Margins(msgspec.Struct, frozen=True, kw_only=True):
     axis: int
     limits: Numbers
     smallest_singular_value: float
-    condition_number: float | None
-    manipulability: float
     clearance: float | None
     parts: tuple[str, str] | None
 

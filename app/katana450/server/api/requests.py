@@ -310,15 +310,13 @@ class Query(Request, frozen=True, kw_only=True):
 
     Attributes:
         at: Subject of the answer, which has the same name: the state, the description of the arm,
-            the branches, the timing of the control loop, the objects, the VRML
-            world, the poses of the links, or the program with its steps.
+            the branches, the timing of the control loop, the objects, the VRML world, or the
+            program with its steps.
     """
 
     traits: ClassVar[Traits] = Traits(question=True, answered=True)
 
-    at: Literal["state", "arm", "branches", "loop", "objects", "world", "links", "program_plan"] = (
-        "state"
-    )
+    at: Literal["state", "arm", "branches", "loop", "objects", "world", "program_plan"] = "state"
 
 
 EVERY: tuple[type[Request], ...] = tuple(

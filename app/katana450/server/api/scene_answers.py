@@ -97,24 +97,6 @@ class World(Answer, frozen=True, kw_only=True):
     nodes: list[Node]
 
 
-class Link(msgspec.Struct, frozen=True, kw_only=True):
-    """Pose of a link.
-
-    Attributes:
-        name: Name of the link.
-        T: (4, 4) Pose in the base frame.
-    """
-
-    name: str
-    T: list[Numbers]
-
-
-class Links(Answer, frozen=True, kw_only=True):
-    """Poses of all links, the base first."""
-
-    links: list[Link]
-
-
 class Mesh(Answer, frozen=True, kw_only=True):
     """An uploaded mesh.
 

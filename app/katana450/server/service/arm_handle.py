@@ -162,15 +162,10 @@ class ArmHandle:
 
 
 class Nodes(ABC):
-    """Nodes of a robot and its environment by name, and the poses of its links."""
+    """Nodes of a robot and its environment by name."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-
-    def links(self, state: State) -> answers.Links:
-        """Return the poses of all links."""
-        frames = self._robot.frames(self._values(state))
-        return answers.Links(links=[answers.Link(name=n, T=T.tolist()) for n, T in frames.items()])
 
     def _values(self, state: State) -> Mapping[str, float]:
         return self._robot.joint_values(state.q, state.gripper)

@@ -8,9 +8,9 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.commands import commands as cmd
@@ -19,11 +19,11 @@ from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import CAUSES, Finding, State
 from katana450.arm.control.state.stop_cause import StopCause, pressed
 from katana450.arm.runtime.pipes.presses import Presses
+from katana450.arm.runtime.pipes.state_publisher import Snapshot
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.heartbeats import check_in_time
 from katana450.server.service.recorder import Recorder
-from katana450.server.service.stop_state import StopRecord
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -31,6 +31,41 @@ log = logging.getLogger(__name__)
 SETTLE_TIME = 0.3
 """[s] Time after a pause in which commands are refused: three intervals of the heartbeats, so that
 messages which waited meanwhile have arrived."""
+
+
+@dataclass(frozen=True)
+class StopRecord:
+    """A stop and its cause.
+
+    Attributes:
+        cause: Cause of the stop, with the participant that pressed STOP.
+        ticket: Ticket of the newest stop sent to the arm; None before one was sent.
+        confirmed: Whether a state of the arm that is newer than the request is stopped.
+    """
+
+    cause: StopCause
+    ticket: int | None = None
+    confirmed: bool = False
+
+    @property
+    def why(self) -> str:
+        """Reason in words."""
+        return self.cause.why
+
+    @property
+    def stage(self) -> str:
+        """Stage of the stop: ``requested``, then ``confirmed`` by a state of the arm."""
+        return "confirmed" if self.confirmed else "requested"
+
+    def requested(self, ticket: int) -> Self:
+        """Return the record of the stop sent (again) as ``ticket``, not confirmed yet."""
+        return replace(self, ticket=ticket, confirmed=False)
+
+    def seen(self, snapshot: Snapshot) -> Self:
+        """Return the record, confirmed if ``snapshot`` includes the request and is stopped."""
+        if self.confirmed or self.ticket is None or snapshot.ticket < self.ticket:
+            return self
+        return self if snapshot.state.stopped is None else replace(self, confirmed=True)
 
 
 class RunningProgram(NamedTuple):

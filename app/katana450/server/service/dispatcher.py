@@ -183,8 +183,6 @@ class Dispatcher:
         match subject:
             case "arm":
                 return serialize.arm(arm)
-            case "links":
-                return arm.nodes.links(arm.state)
             case "branches":
                 return answers.Branches(
                     choices=[serialize.branch_option(choice) for choice in arm.choices()]

@@ -24,30 +24,49 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.server.api.requests import RequestDecoder
 from katana450.server.service.arm_handle import ArmHandle
-from katana450.server.service.command_gate import CommandGate, guarded
+from katana450.server.service.command_gate import CommandGate, StopRecord, guarded
 from katana450.server.service.driver_watch import DriverWatch
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
-from katana450.server.service.known_pages import KnownPages, renamed
 from katana450.server.service.participants import (
+    KnownPages,
     Participant,
     ShownPictures,
-    Takeover,
     key_of,
     presser_of,
+    renamed,
     session_of,
 )
 from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import RequestHandler, Runner
 from katana450.server.service.stop_path import StopPath
-from katana450.server.service.stop_state import StopNews, StopRecord
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
 
 TICK = 0.02
 """Interval of the checks for silence [s]."""
+
+
+class StopNews:
+    """Calls listeners when a stop begins, is confirmed for the first time, or is cleared.
+
+    A repeated press is no news, so that a flood of STOP causes no flood of messages.
+    """
+
+    def __init__(self) -> None:
+        self.listeners: set[Callable[[], None]] = set()
+        """Called without arguments, in the thread of ``note``."""
+        self._shown = (False, False)
+
+    def note(self, stopped: StopRecord | None) -> None:
+        """Call the listeners if ``stopped``, the present stop, is news."""
+        confirmed = stopped is not None and (stopped.confirmed or self._shown[1])
+        before, self._shown = self._shown, (stopped is not None, confirmed)
+        if self._shown != before:
+            for listener in tuple(self.listeners):
+                listener()
 
 
 class Hub:
@@ -77,7 +96,6 @@ class Hub:
         self._participants: dict[str, Participant] = {}
         self.pictures = ShownPictures()
         self._known = KnownPages()
-        self._takeover: Takeover | None = None
         self._ticked = clock()
         self._driver_watch = DriverWatch(self.gate, self._ticked)
         self.supervisor_problem: Callable[[], str | None] = lambda: None
@@ -159,7 +177,7 @@ class Hub:
         return participant
 
     def rename(self, participant: Participant, name: str) -> None:
-        """Give ``participant`` the name ``name``. Raises InputError; see ``names.renamed``."""
+        """Give ``participant`` the name ``name``. Raises InputError; see ``renamed``."""
         person = renamed(participant.person, name, self._known.people)
         self.recorder.note("rename", participant.actor, {"name": person.name})
         participant.person = person
@@ -255,31 +273,23 @@ class Hub:
 
     def take(self, participant: Participant) -> None:
         """Take the lease from its holder for ``participant``. Raises LeaseError if not allowed."""
-        drove = [other for other in self.participants if self.giver(other) == self.lease.holder]
         person, act = participant.person, "taken" if self.lease.driver else "acquired"
         self.gate.change(lambda lease, t: lease.take(person, t), participant.actor, act)
-        self._takeover = Takeover(person, frozenset(other.person.key for other in drove))
 
     def request(self, participant: Participant) -> None:
         """Request the lease from its holder for ``participant``. Raises LeaseError."""
         person = participant.person
-        self.gate.change(lambda lease, _: lease.request(person), participant.actor, "requested")
+        self.gate.change(lambda lease, _: lease.request(person), participant.actor)
 
     def withdraw(self, participant: Participant) -> None:
         """Withdraw the request of ``participant`` for the lease."""
         person = participant.person
-        self.gate.change(lambda lease, _: lease.withdraw(person), participant.actor, "withdrawn")
-
-    def taken_by(self, participant: Participant) -> str | None:
-        """Return the name of the holder who took the lease from ``participant``; None if none."""
-        took = self._takeover
-        return None if took is None else took.taker_from(participant.person, self.lease.holder)
+        self.gate.change(lambda lease, _: lease.withdraw(person), participant.actor)
 
     def release_lease(self, participant: Participant) -> None:
         """Release the lease of ``participant``. Raises LeaseError if another holds it."""
         person = participant.person
         self.gate.change(lambda lease, _: lease.release(person), participant.actor, "released")
-        self._takeover = None
 
     def hand_over(self, participant: Participant, number: int) -> None:
         """Hand the lease to the participant of ``number``; a running program of the giver ends."""
@@ -291,7 +301,7 @@ class Hub:
         """Decline the request of the participant of ``number`` for the lease, and notify it."""
         giver, requester = self.giver(participant), self._numbered(number)
         person, actor = requester.person, participant.actor
-        self.gate.change(lambda lease, _: lease.decline(giver, person), actor, "declined")
+        self.gate.change(lambda lease, _: lease.decline(giver, person), actor)
         why = f"{participant.person.name} declined your request."
         requester.notify({"is": "refused", "why": why})
 

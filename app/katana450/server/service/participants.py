@@ -1,19 +1,41 @@
-"""Participants of a server: pages and programs, their keys, and the pictures that they get."""
+"""Participants of a server: pages and programs, their names, keys, and the pictures they get."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import re
+import unicodedata
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.state.stop_cause import StopCause
+from katana450.errors import InputError
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 
 SHARED_SESSION = "programs"
 """Session of all programs that send single requests over HTTP, on a server without links."""
+
+MAX_PAGES = 256
+"""Number of pages that are recognised when they return."""
+
+
+MAX_NAME = 24
+"""Maximum number of characters of a name."""
+
+BLANK = re.compile("[\u115f\u1160\u2800\u3164\uffa0]")
+"""Printable characters that show nothing."""
+
+RESERVED = re.compile(r"you|somebody|nobody|(the )?server|(window|program) \d+.*")
+"""Names by which the page means someone else."""
+
+MAX_MARKS = 2
+"""Maximum number of marks on one letter."""
+
+ACTS = "pressed STOP|ended it|cancelled the planning|went to step|runs it from"
+"""Pattern of the acts of people in sentences."""
 
 
 @dataclass(eq=False)
@@ -41,18 +63,6 @@ class Participant:
     def actor(self) -> Actor:
         """The participant as the actor of a command that is handled on receipt."""
         return Actor(self.person, self.channel)
-
-
-class Takeover(NamedTuple):
-    """The newest take-over of the lease. ``drivers``: keys of those that drove before."""
-
-    taker: Person
-    drivers: frozenset[str]
-
-    def taker_from(self, person: Person, holder: Person | None) -> str | None:
-        """Return the name of the taker if it took over from ``person`` and is the ``holder``."""
-        took = person.key in self.drivers and holder == self.taker
-        return self.taker.name if took else None
 
 
 def actor_of(identity: Identity, channel: CommandChannel, address: str = "") -> Actor:
@@ -126,3 +136,89 @@ class ShownPictures:
         """Return the age of the picture that the window ``key`` shows at ``t`` [s]."""
         pictures = [picture for picture, window in self._windows.items() if window == key]
         return pictures[-1].age(t) if pictures else 0.0
+
+
+class KnownPages:
+    """Person and number of each page, also of pages that are closed now."""
+
+    def __init__(self) -> None:
+        """Create a memory without pages."""
+        self._known: dict[str, tuple[Person, int]] = {}
+        self._numbers = 0
+
+    @property
+    def people(self) -> list[Person]:
+        """The persons at these pages. For any thread."""
+        # A copy: other threads add people.
+        return [person for person, _ in list(self._known.values())]
+
+    def find(self, key: str) -> Person | None:
+        """Return the person at the page of ``key``; None for an unknown page."""
+        return self._known.get(key, (None, 0))[0]
+
+    def recognise(
+        self, key: str, identity: Identity, open_now: Container[str]
+    ) -> tuple[Person, int]:
+        """Return person and number of the page of ``key``; a new page gets new ones.
+
+        ``open_now``: keys of the open pages; of the others the oldest are forgotten.
+        """
+        known = self._known.pop(key, None)
+        person, number = known or self._new(key, identity)
+        # A page that returns may have another address.
+        person = replace(person, link=identity.link, address=identity.address)
+        self._known[key] = (person, number)
+        absent = [page for page in self._known if page not in open_now and page != key]
+        for page in absent[: max(len(self._known) - MAX_PAGES, 0)]:
+            del self._known[page]
+        return person, number
+
+    def rename(self, person: Person, number: int) -> None:
+        """Remember the new name of ``person``."""
+        self._known[person.key] = (person, number)
+
+    def forget(self, key: str) -> None:
+        """Forget the page of ``key``."""
+        self._known.pop(key, None)
+
+    def _new(self, key: str, identity: Identity) -> tuple[Person, int]:
+        self._numbers += 1
+        name = free_name(identity.name, self._numbers, self.people)
+        return identity.person(key, name), self._numbers
+
+
+def addressed(words: str, name: str) -> str:
+    """Return ``words`` for the person ``name``, who is "You" where they say what that one did."""
+    return re.sub(rf"^{re.escape(name)} (?={ACTS})", "You ", words).replace("You runs", "You run")
+
+
+def free_name(name: str | None, number: int, others: Iterable[Person]) -> str:
+    """Return ``name``, or "Window" without one, with ``number`` where it is needed."""
+    name = name or f"Window {number}"
+    return f"{name} ({number})" if any(other.name == name for other in others) else name
+
+
+def renamed(person: Person, name: str, others: Iterable[Person]) -> Person:
+    """Return ``person`` with ``name``, with single spaces.
+
+    Raises InputError if the name is empty, too long, not printable, reserved, or that of one of
+    ``others``, and for a person whose name is that of an access link.
+    """
+    name = " ".join(unicodedata.normalize("NFKC", name).split())
+    if person.link:
+        raise InputError("Your name is that of your access link. An admin can change it.")
+    if name == person.name:
+        return person
+    if not name:
+        raise InputError("The name is empty. Type at least one character.")
+    if len(name) > MAX_NAME:
+        raise InputError(f"The name has {len(name)} characters. The maximum is {MAX_NAME}.")
+    marks = "".join("m" if unicodedata.combining(character) else " " for character in name)
+    if not name.isprintable() or BLANK.search(name) or "m" * (MAX_MARKS + 1) in marks:
+        raise InputError("The name has characters that cannot be shown. Choose another name.")
+    if not any(character.isalnum() for character in name) or RESERVED.fullmatch(name.casefold()):
+        raise InputError(f"{name} is not a name of one person. Choose another name.")
+    plain = name.casefold()
+    if any(other.key != person.key and other.name.casefold() == plain for other in others):
+        raise InputError(f"The name {name} is taken. Choose another name.")
+    return replace(person, name=name)

@@ -23,10 +23,8 @@ LEASE_GROUNDS = {
     "acquired": "the lease was free",
     "taken": "an admin may take the lease",
     "expired": "the holder was silent",
-    "requested": "",
-    "withdrawn": "",
 }
-"""Grounds of what happens to the lease, where its holder does not do it."""
+"""Grounds of a change of the holder of the lease, where that one does not do it."""
 
 REFUSED, ACCEPTED = "refused", "accepted"
 """Values of ``Verdict``."""
@@ -103,13 +101,11 @@ class Recorder:
         self.note("stop", actor, what, why=why, outcome=ACCEPTED, always=first)
 
     def lease(self, act: str, before: Lease, after: Lease, by: Actor) -> None:
-        """Note that ``act`` changed the holder of the lease, or the requests for it."""
-        old, new = before.holder, after.holder
-        if old == new:
-            # A request comes from its sender; its end is an answer to that one.
-            old = old if len(after.waiting) > len(before.waiting) else None
-            new = next((person for person in before.waiting if person not in after.waiting), None)
-        names = {"from": old and old.name, "to": new and new.name}
+        """Note that ``act`` changed the holder of the lease."""
+        names = {
+            "from": before.holder and before.holder.name,
+            "to": after.holder and after.holder.name,
+        }
         what = {"lease": act, **{word: name for word, name in names.items() if name}}
         self.note("lease", by, what, grounds=LEASE_GROUNDS.get(act, "holds the lease"))
 

@@ -18,7 +18,7 @@ from katana450.arm.control.session.tool_targets import BranchOption
 from katana450.arm.control.state import state as control
 from katana450.arm.control.state.arm_report import ArmReport
 from katana450.arm.control.state.margins import Margins
-from katana450.arm.control.state.messages import MAX_CONDITION, finding_text, sentence
+from katana450.arm.control.state.messages import finding_text, sentence
 from katana450.arm.control.state.solid import Colour
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -184,15 +184,12 @@ def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
 
 def margins(distances: Margins) -> answers.Margins:
     """Return the distances to limits, singularity and contact as a part of an answer."""
-    nearest, values = distances.nearest, distances.singular_values
-    singular = values[0] >= MAX_CONDITION * values[-1]
+    nearest = distances.nearest
     return answers.Margins(
         limit=float(distances.limits[distances.axis]),
         axis=distances.axis + 1,
         limits=distances.limits.tolist(),
-        smallest_singular_value=float(values[-1]),
-        condition_number=None if singular else float(values[0] / values[-1]),
-        manipulability=float(values.prod()),
+        smallest_singular_value=float(distances.singular_values[-1]),
         clearance=None if nearest is None else nearest.distance,
         parts=None if nearest is None else nearest.parts,
     )

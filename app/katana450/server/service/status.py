@@ -15,8 +15,7 @@ from katana450.arm.control.state.messages import headline, mood, sentence
 from katana450.arm.control.state.state import State, Status
 from katana450.arm.runtime.pipes.stop_messages import NO_STATE
 from katana450.server.service.hub import Hub
-from katana450.server.service.known_pages import addressed
-from katana450.server.service.participants import Participant
+from katana450.server.service.participants import Participant, addressed
 from katana450.server.service.runner import StatusLine
 
 FIRST = (Status.FAULT, Status.STOPPED, Status.BLOCKED)
@@ -147,7 +146,6 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     decides = hub.giver(participant) == lease.holder
     program = hub.runner.progress()
     planning = program is not None and program.status == "planning"
-    taker = hub.taken_by(participant)
     age = hub.pictures.age(participant.person.key, hub.clock())
     stopped = hub.stopped
     own_stop = None if stopped is None or stopped.cause.key != person.key else stopped.why
@@ -178,7 +176,6 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
             for other in hub.participants
             if mine and other.person != person and other.person.role.may_drive
         ],
-        "taken": "" if taker is None else f"{taker} took over from you.",
         "planning": planning,
         "fraction": round(program.fraction, 2) if program is not None and planning else 0.0,
         "orders": list(hub.runner.orders(participant)) if hub.arm is not None else [],

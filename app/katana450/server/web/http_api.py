@@ -38,7 +38,7 @@ from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_js
 
 log = logging.getLogger(__name__)
 
-QUERY_SUBJECTS = ("state", "arm", "branches", "loop", "objects", "world", "links", "program_plan")
+QUERY_SUBJECTS = ("state", "arm", "branches", "loop", "objects", "world", "program_plan")
 """Subjects of the request ``query``. Each has a URL path of its own for GET."""
 
 PROGRAM_KEY = re.compile(r"[A-Za-z0-9_-]{16,64}")

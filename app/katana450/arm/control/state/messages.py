@@ -297,10 +297,6 @@ def limit_text(number: int, name: str, angle: float) -> str:
     return f"{axis_label(number + 1, name)}: {degrees(angle)} left"
 
 
-MAX_CONDITION = 1e6
-"""Condition number above which only rounding separates the arm from a singularity."""
-
-
 def excluded(branch: object, axes: Sequence[int]) -> str:
     """Return the reason why the arm cannot take ``branch``: the limits of ``axes``, from 0."""
     *most, last = [str(axis + 1) for axis in axes]

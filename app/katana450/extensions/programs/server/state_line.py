@@ -11,7 +11,7 @@ from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.server.program_planner import PlanningPhase
 from katana450.server.api.answers import Progress
 from katana450.server.api.program_requests import ProgramOrder
-from katana450.server.service.known_pages import addressed
+from katana450.server.service.participants import addressed
 from katana450.server.service.runner import StatusLine
 
 RUNS = ("running", "paused", "blocked")
