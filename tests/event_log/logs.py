@@ -4,36 +4,46 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
-from katana450.assembly.event_log.disk_log import (
-    MAX_FILE_BYTES,
-    MAX_FILES,
-    DiskLog,
-    Record,
-    log_files,
-    record,
-)
+from katana450.arm.control.actor import SERVER
+from katana450.assembly.event_log.disk_log import MAX_FILE_BYTES, MAX_FILES, DiskLog, log_files
+from katana450.assembly.event_log.record_maker import Record
+from katana450.server.service.recorder import Recorder
 
 CLOSING = 20.0
 """[s] Timeout of the writer's end."""
 
 
-def write(
-    folder: Path,
-    contents: list[Record],
-    max_file_bytes: int = MAX_FILE_BYTES,
-    max_files: int = MAX_FILES,
-) -> None:
-    """Write ``contents`` between a start and an end."""
-    log = DiskLog(folder, 8080, max_file_bytes, max_files)
-    for content in contents:
-        log.put(content)
-    log.close(requested=True, timeout=CLOSING)
+class Writer:
+    """A log in ``folder``, and a recorder whose notes it writes."""
+
+    def __init__(
+        self, folder: Path, max_bytes: int = MAX_FILE_BYTES, files: int = MAX_FILES
+    ) -> None:
+        self.recorder = Recorder()
+        self._log = DiskLog(self.recorder, folder, 8080, max_bytes, files)
+
+    def note(self, *contents: Any) -> None:
+        """Note events that are always recorded, with ``contents``."""
+        for content in contents:
+            self.recorder.note("refusal", SERVER, content, always=True)
+
+    def close(self) -> None:
+        """Write what waits."""
+        self._log.close(CLOSING)
 
 
-def numbered(count: int) -> list[Record]:
-    """Return ``count`` different records."""
-    return [record("command", {"command": "Joint", "value": n}) for n in range(count)]
+def write(folder: Path, *contents: Any, max_bytes: int = MAX_FILE_BYTES, files: int = 10) -> None:
+    """Write records with ``contents`` between a start and an end."""
+    log = Writer(folder, max_bytes, files)
+    log.note(*contents)
+    log.close()
+
+
+def numbered(count: int) -> list[dict[str, int]]:
+    """Return the contents of ``count`` different records."""
+    return [{"value": n} for n in range(count)]
 
 
 def lines(folder: Path) -> list[bytes]:

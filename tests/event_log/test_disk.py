@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from katana450.assembly.event_log.disk_log import PRESENT, DiskLog, LogFile, Record, record
+from katana450.assembly.event_log.disk_log import PRESENT, LogFile
+from katana450.assembly.event_log.record_maker import Record
 from katana450.client import connect
 from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
-from tests.event_log.logs import CLOSING, numbered, records
+from tests.event_log.logs import Writer, numbered, records
 from tests.waiting import until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such devices")
@@ -33,15 +34,16 @@ def test_writer_continues_when_a_full_disk_has_room_again(
     folder = tmp_path / "log"
     device = full(folder)
     with caplog.at_level(logging.WARNING, "katana450"):
-        writer = DiskLog(folder, 8080)
-        for content in numbered(50):
-            writer.put(content)
+        writer = Writer(folder)
+        writer.note(*numbered(50))
         until(lambda: caplog.records)
         (entry,) = caplog.records
         assert "cannot be written: No space left on device" in entry.getMessage()
+        assert "No space left" in writer.recorder.problem
         device.unlink()
         until(lambda: "is written again" in caplog.text)
-    writer.close(requested=True, timeout=CLOSING)
+        assert writer.recorder.problem == ""
+    writer.close()
     lost, end = records(folder)
     assert (lost["kind"], lost["what"]["count"], end["kind"]) == ("lost", 51, "end")
     assert "No space left" in lost["why"]
@@ -59,39 +61,27 @@ def test_lost_records_stand_between_those_before_and_after_them(
         written(file, content)
 
     monkeypatch.setattr(LogFile, "append", append)
-    writer = DiskLog(tmp_path, 8080)
-    for content in numbered(6):
-        writer.put(content)
+    writer = Writer(tmp_path)
+    writer.note(*numbered(6))
     until(lambda: not room[0])
+    until(lambda: writer.recorder.problem)
     room[0] = 100
-    writer.close(requested=True, timeout=CLOSING)
+    writer.close()
     start, *early, lost, end = records(tmp_path)
     assert [entry["what"]["value"] for entry in early] == [0, 1]
     assert (start["kind"], lost["what"]["count"], end["kind"]) == ("start", 4, "end")
 
 
-def test_record_that_cannot_be_written_is_counted(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    writer = DiskLog(tmp_path, 8080)
-    until(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
-    writer.put(record("command", object()))
-    until(lambda: caplog.records)
-    writer.close(requested=True, timeout=CLOSING)
-    start, lost, end = records(tmp_path)
-    assert (lost["what"]["count"], start["kind"], end["kind"]) == (1, "start", "end")
-
-
 def test_second_writer_of_a_folder_waits_for_the_first(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    first = DiskLog(tmp_path, 8080)
+    first = Writer(tmp_path)
     until(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
-    second = DiskLog(tmp_path, 8080)
+    second = Writer(tmp_path)
     until(lambda: "another server writes there" in caplog.text)
-    first.close(requested=True, timeout=CLOSING)
+    first.close()
     # The place is free now.
-    second.close(requested=True, timeout=CLOSING)
+    second.close()
     assert [entry["kind"] for entry in records(tmp_path)] == ["start", "end", "lost", "end"]
 
 

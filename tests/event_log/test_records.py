@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
-from multiprocessing import Pipe
 from pathlib import Path
 
 import numpy as np
@@ -15,20 +13,16 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Command
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session.session import Session
-from katana450.assembly.event_log.disk_log import (
-    MAX_LINE_BYTES,
-    MAX_TEXT,
-    Record,
-    encoded,
-    record,
-)
+from katana450.assembly.event_log.disk_log import MAX_LINE_BYTES, encoded
 from katana450.assembly.event_log.record_maker import (
     BURST,
+    MAX_TEXT,
     RATE,
     STREAM_GAP,
+    Record,
     RecordMaker,
-    RecordSender,
     content_of,
+    record,
 )
 from katana450.client import connect
 from katana450.server.api import requests
@@ -205,18 +199,6 @@ def test_notes_that_nobody_reads_do_not_pile_up() -> None:
     recorder.stop("Bert pressed STOP.", BERT, first=False)
     recorder.stop("Anna pressed STOP.", ANNA, first=True)
     assert (recorder.notes.qsize(), recorder.lost) == (MAX_WAITING + 1, 11)
-
-
-def test_problem_of_the_writer_is_known_without_another_note() -> None:
-    recorder, (pipe, writer) = Recorder(), Pipe()
-    sender = RecordSender(recorder, pipe)
-    for problem in ("The event log cannot be written: No space left on device.", ""):
-        writer.send(problem)
-        end = time.monotonic() + 20.0
-        while recorder.problem != problem:
-            assert time.monotonic() < end
-            time.sleep(0.02)
-    sender.close()
 
 
 @pytest.mark.parametrize("closed", [False, True])

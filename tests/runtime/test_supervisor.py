@@ -196,7 +196,7 @@ def test_excused_time_ends_now(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_process_that_supervises_loads_no_calculation() -> None:
     """It takes part of the start, and stays for as long as the server."""
     script = (
-        "import sys, katana450.cli.serve, katana450.assembly.event_log.disk_log\n"
+        "import sys, katana450.cli.serve\n"
         "loaded = {'numpy', 'ruckig', 'katana450.arm.control.state.state'} & sys.modules.keys()\n"
         "assert not loaded, loaded"
     )

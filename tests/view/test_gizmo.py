@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -66,10 +67,7 @@ def test_rings_turn_the_tool_of_their_arm(
     gizmo.follow()
     assert tuple(gizmo._rings) == RINGS[name]
     for ring, handle in gizmo._rings.items():
-        turned = {
-            **{"pitch": gizmo._pitched, "roll": gizmo._rolled},
-            **{"turn": gizmo._turned, "elbow": gizmo._elbow_turned},
-        }[ring]
+        turned = gizmo._turned if ring == "turn" else partial(gizmo._ring_turned, ring)
         about_x = ring in ("roll", "elbow")
         start, axis = np.array(handle.wxyz), (1.0, 0.0, 0.0) if about_x else (0.0, 1.0, 0.0)
         asyncio.run(turned(Drag(handle, "start")))  # type: ignore[arg-type]

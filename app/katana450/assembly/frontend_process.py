@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import gc
 import socket
-from multiprocessing.connection import Connection
+from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.extension import ServerFacts
-from katana450.platform_support import reset_priority
+from katana450.platform_support import reset_priority, state_folder
 
 if TYPE_CHECKING:
     from katana450.assembly.web_server import WebServer
@@ -34,13 +35,15 @@ class Sockets(NamedTuple):
     lines: socket.socket | None
 
 
-def run_frontend(
-    config: ServerFacts, sockets: Sockets, records: Connection, supervisor: SupervisorPipe
-) -> None:
-    """Run the front end in this process, from start to end. Raises KatanaError.
+def log_folder(options: Namespace, port: int) -> Path | None:
+    """Return the folder of the event log of the server on ``port``; None without a log."""
+    if options.no_log:
+        return None
+    return options.log or state_folder() / "katana450" / "events" / f"port-{port}"
 
-    records: pipe to the event log.
-    """
+
+def run_frontend(config: ServerFacts, sockets: Sockets, supervisor: SupervisorPipe) -> None:
+    """Run the front end in this process, from start to end. Raises KatanaError."""
     reset_priority()
 
     from katana450.assembly.web_server import WebServer
@@ -49,7 +52,7 @@ def run_frontend(
     web.start()
     supervisor.report(OPEN)
     try:
-        _run(config, web, sockets.lines, records, supervisor)
+        _run(config, web, sockets.lines, supervisor)
     except EOFError:
         # The server ends before this process is ready.
         return
@@ -64,32 +67,36 @@ def _run(
     config: ServerFacts,
     web: WebServer,
     lines: socket.socket | None,
-    records: Connection,
     supervisor: SupervisorPipe,
 ) -> None:
     # These imports take a third of a second. The page loads meanwhile.
+    from katana450.arm.control.actor import SERVER
     from katana450.arm.robot.object_meshes import Meshes
     from katana450.assembly.gateway import Gateway
     from katana450.server.viser_bridge.viser_server import close_server
 
     meshes = Meshes(config.folder)
     gateway = Gateway(config.settings, web, lines, meshes)
-    gateway.hub.supervisor_problem = lambda: supervisor.problem
     gateway.hub.replace_robot = supervisor.replace_robot
-    supervisor.notify = gateway.announce
-    sender: RecordSender | None = None
+    recorder, folder = web.recorder, log_folder(config.options, config.port)
+    # Without a reader, notes would only take memory.
+    recorder.enabled = folder is not None
+    event_log: DiskLog | None = None
+
+    def notify(why: str) -> None:
+        recorder.note("restart", SERVER, why=why)
+        gateway.announce(why)
+
+    supervisor.notify = notify
     try:
-        from katana450.assembly.event_log.record_maker import RecordSender
+        from katana450.assembly.event_log.disk_log import DiskLog
         from katana450.assembly.frontend import Frontend
 
         frontend = Frontend(gateway, config, meshes, supervisor.ended)
         gateway.show()
         # Browsers draw the scene meanwhile.
-        if config.options.no_log:
-            # Without a reader, notes would only take memory.
-            web.recorder.enabled = False
-        else:
-            sender = RecordSender(web.recorder, records)
+        if folder is not None:
+            event_log = DiskLog(recorder, folder, config.port)
         gateway.start(config.options)
         supervisor.prove(lambda: gateway.hub.held_up < HANG_SECONDS)
         frontend.start()
@@ -102,6 +109,6 @@ def _run(
         frontend.stop()
     finally:
         web.stop()
-        if sender is not None:
-            sender.close()
+        if event_log is not None:
+            event_log.close()
         close_server(gateway.viser)

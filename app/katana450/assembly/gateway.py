@@ -43,9 +43,9 @@ from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
-from katana450.server.web import control_socket
 from katana450.server.web.admission import Admission
 from katana450.server.web.bodies import refusal
+from katana450.server.web.channel import serve_page
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -214,7 +214,7 @@ def control_routes(hub: Hub, budgets: Budgets, web: WebServer, proxy: Proxy) -> 
         # A browser opens one websocket after the other: the scene waits until this one is accepted.
         await socket.accept()
         await web.ready.wait()
-        await control_socket.serve(hub, authenticator, budgets, socket)
+        await serve_page(hub, authenticator, budgets, socket)
 
     return [
         Route("/stop", stop, methods=["POST"]),

@@ -34,14 +34,11 @@ known state of the arm, without and with its scene, which only the arm's process
 of another robot, with which all processes must start again."""
 
 END, NOTICE = b"e", b"n"
-"""First bytes of the messages of the supervisor, beside heartbeats: the process must end; and a
-notice, which follows."""
+"""First bytes of the messages of the supervisor: the process must end; and a notice, which
+follows."""
 
 HEARTBEAT_INTERVAL = 0.2
-"""[s] Shortest interval of the heartbeats, in both directions: each one is answered."""
-
-QUIET_SECONDS = 1.0
-"""[s] Silence of the supervisor after which its processes report it."""
+"""[s] Shortest interval of the heartbeats."""
 
 END_SECONDS = 4.0
 """[s] Time in which a process must end after its supervisor."""
@@ -60,7 +57,6 @@ class SupervisorPipe:
         self._pipe = pipe
         self._interval = interval
         self._sending = threading.Lock()
-        self._heard = time.monotonic()
         self._alive: Callable[[], bool] = lambda: True
         self.ended = threading.Event()
         """Set when the supervisor ends this process, or has ended itself."""
@@ -74,17 +70,6 @@ class SupervisorPipe:
     def prove(self, alive: Callable[[], bool]) -> None:
         """Send heartbeats only while ``alive`` returns True; it is called at each of them."""
         self._alive = alive
-
-    @property
-    def problem(self) -> str | None:
-        """The problem of the supervisor in words; None if it answers."""
-        silent = time.monotonic() - self._heard
-        if silent < QUIET_SECONDS:
-            return None
-        return (
-            f"The supervisor has not answered for {silent:.1f} s. "
-            "A process that ends now is not started again."
-        )
 
     def report(self, status: str | KatanaError) -> None:
         """Send a status word, or the error that ends this process.
@@ -133,34 +118,16 @@ class SupervisorPipe:
         os._exit(1)
 
     def _converse(self) -> None:
-        """Exchange heartbeats until the supervisor ends this process."""
-        quiet = False
-        due = time.monotonic()
+        """Send heartbeats until the supervisor ends this process."""
         while True:
-            pending = self._pipe.poll(max(due - time.monotonic(), 0.0))
-            if pending:
+            if self._pipe.poll(self._interval):
                 message = self._pipe.recv_bytes()
-                self._heard = time.monotonic()
                 if message == END:
                     return
-                if message.startswith(NOTICE):
-                    self.notify(message[len(NOTICE) :].decode())
-                pending = message == HEARTBEAT
-            # The answer to a heartbeat saves a turn of this thread. Without any it comes by itself.
-            if pending or time.monotonic() >= due:
-                due = time.monotonic() + 1.5 * self._interval
-                # A supervisor that hangs reads nothing, and the pipe fills.
-                if self._alive() and writable(self._pipe.fileno()):
-                    self._send(HEARTBEAT)
-                quiet = self._report_silence(quiet)
-
-    def _report_silence(self, reported: bool) -> bool:
-        problem = self.problem
-        if problem is not None and not reported:
-            log.error("%s", problem)
-        elif problem is None and reported:
-            log.warning("The supervisor answers again.")
-        return problem is not None
+                self.notify(message[len(NOTICE) :].decode())
+            # A supervisor that hangs reads nothing, and the pipe fills.
+            elif self._alive() and writable(self._pipe.fileno()):
+                self._send(HEARTBEAT)
 
 
 def run_supervised(

@@ -1,8 +1,8 @@
 """The supervisor: starts the processes of the server, watches each, and starts it again.
 
-It also keeps the arm's last state and, in a thread, writes the event log. It imports almost
-nothing, so that it is always there. A process that ends is noticed at once. A process that hangs is
-noticed by the silence of its pipe, and is ended.
+It also keeps the arm's last state. It imports almost nothing, so that it is always there. A process
+that ends is noticed at once. A process that hangs is noticed by the silence of its pipe, and is
+ended.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from typing import Any
 from katana450.arm.runtime.readiness import writable
 from katana450.assembly.supervised import (
     END,
-    HEARTBEAT,
     HEARTBEAT_INTERVAL,
     KEPT,
     NOTICE,
@@ -40,9 +39,6 @@ from katana450.platform_support import stop_signals_blocked
 from katana450.portable_rounding import starting_portable_processes
 
 BEATS_BEFORE_DEADLINE = 4
-
-MAX_HEARTBEAT_INTERVAL = 0.4
-"""[s] Longest interval of the heartbeats; a process soon reports that its supervisor hangs."""
 
 TURN = HEARTBEAT_INTERVAL
 """[s] Interval at which signals and silence are checked; the end of a process wakes earlier."""
@@ -103,9 +99,8 @@ class ChildSpec:
 
     @property
     def heartbeat_interval(self) -> float:
-        """Interval of the heartbeats [s]: several before the deadline, and no more than needed."""
-        wanted = self.deadline / BEATS_BEFORE_DEADLINE
-        return min(max(wanted, HEARTBEAT_INTERVAL), MAX_HEARTBEAT_INTERVAL)
+        """Interval of the heartbeats [s]: several before the deadline."""
+        return max(self.deadline / BEATS_BEFORE_DEADLINE, HEARTBEAT_INTERVAL)
 
 
 class Child:
@@ -123,7 +118,7 @@ class Child:
         """Time of the next start [s]; None while a process runs."""
         self._early_ends = 0
         self._ready_at: float | None = None
-        self._started = self._heard = self._beaten = 0.0
+        self._started = self._heard = 0.0
         self._first = True
 
     def start(self) -> None:
@@ -201,13 +196,6 @@ class Child:
             return f"has not answered for {silent:.1f} s"
         return None
 
-    def beat(self) -> None:
-        """Send a heartbeat to the process, unless one was sent in this turn already."""
-        now = time.monotonic()
-        if now - self._beaten >= self.spec.heartbeat_interval - TURN / 2:
-            self._beaten = now
-            self.send(HEARTBEAT)
-
     def send(self, message: bytes) -> None:
         """Send ``message``, unless the process hangs so that its pipe is full."""
         with suppress(OSError):
@@ -241,8 +229,6 @@ class Supervisor:
 
     def __init__(self, specs: Sequence[ChildSpec], stopping: threading.Event) -> None:
         """Create the supervisor. ``stopping``: ends ``wait_for`` and ``run`` once it is set."""
-        self.on_restart: Callable[[str, int | None], None] = lambda _name, _status: None
-        """Called with the name and the exit status of each process that is started again."""
         self._children = {spec.name: Child(spec) for spec in specs}
         self._stopping = stopping
         self._turned = self._notice_at = time.monotonic()
@@ -306,11 +292,9 @@ class Supervisor:
         )
         before, self._turned = self._turned, time.monotonic()
         late = self._turned - before - TURN
-        for child in self._children.values():
+        for child in self._children.values() if late > TURN / 2 else ():
             if child.due is None:
-                if late > TURN / 2:
-                    child.excuse(late)
-                child.beat()
+                child.excuse(late)
 
     def _watch(self, child: Child) -> None:
         if child.due is not None:
@@ -329,7 +313,6 @@ class Supervisor:
             when = f" in {delay:g} s" if delay else ""
             text = f"{child.spec.title} ended with status {code} and is started again{when}."
             log.error("%s%s", text, error)
-            self.on_restart(child.spec.name, code)
             self._announce(child, text)
             if not delay:
                 self._start(child)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import multiprocessing
 import os
 import shutil
 import signal
@@ -14,17 +13,14 @@ from argparse import Namespace
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from multiprocessing.connection import Connection
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
 from katana450.arm.runtime.pipes.private_listener import PrivateAddress
-from katana450.assembly.event_log.disk_log import DiskLog, default_folder
-from katana450.assembly.frontend_process import OPEN, Sockets, run_frontend
+from katana450.assembly.frontend_process import OPEN, Sockets, log_folder, run_frontend
 from katana450.assembly.log_output import say, start_log
 from katana450.assembly.supervised import READY
-from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
+from katana450.assembly.supervisor import Supervisor, child_spec
 from katana450.cli.open_page import show_page
 from katana450.errors import ConfigurationError, KatanaError
 from katana450.extension import ExtraProcess, ServerFacts, load, results
@@ -85,10 +81,8 @@ def serve(options: Namespace) -> int:
     listening = listen(settings.host, settings.port)
     lines = None if settings.lines is None else listen(LOOPBACK, settings.lines)
     stopping_socket = listen_beside(listening, settings.host, settings.stop_port)
-    port, stop_port = listening.getsockname()[1], stopping_socket.getsockname()[1]
-    settings = replace(settings, stop_port=stop_port)
-    event_log = None if options.no_log else DiskLog(options.log or default_folder(port), port)
-    server = _Server(settings, Sockets(listening, lines), stopping_socket, event_log, stopping)
+    settings = replace(settings, stop_port=stopping_socket.getsockname()[1])
+    server = _Server(settings, Sockets(listening, lines), stopping_socket, stopping)
     again, before = False, None
     try:
         while True:
@@ -112,8 +106,6 @@ def serve(options: Namespace) -> int:
     finally:
         listening.close()
         stopping_socket.close()
-        if event_log is not None:
-            event_log.close(requested=stopping.is_set())
 
 
 @dataclass(frozen=True)
@@ -125,14 +117,12 @@ class _Server:
         sockets: the sockets of the page and of programs, held by this process, so that the ports
             stay taken.
         stopping_socket: the socket for STOP.
-        event_log: the event log; None without one.
         stopping: set when the server must end.
     """
 
     settings: Settings
     sockets: Sockets
     stopping_socket: socket.socket
-    event_log: DiskLog | None
     stopping: threading.Event
 
     def run(self, options: Namespace, *, again: bool) -> Path | None:
@@ -141,18 +131,18 @@ class _Server:
         Returns the file of another robot that a person chose meanwhile; None if the server must
         end. ``again``: whether it drove another robot before.
         """
-        settings, stopping, event_log = self.settings, self.stopping, self.event_log
+        settings, stopping = self.settings, self.stopping
         port = self.sockets.pages.getsockname()[1]
         url = settings.public_url or local_url(settings, port)
         folder, claimed = _private_folder()
         address = PrivateAddress(pipe_address(folder, "arm"), os.urandom(32))
         facts = ServerFacts(settings, options.urdf, options.tool, port, address, options, folder)
-        front_end_work = _FrontendWork(facts, self.sockets, event_log)
+        front_end = partial(run_frontend, facts, self.sockets)
         stop = partial(_run, RUN_STOP, facts, self.stopping_socket)
         extra: list[ExtraProcess] = [*results("process", options, facts)]
         specs = (
             child_spec(STOP, "The process of STOP", stop, STOP_DEADLINE),
-            ChildSpec(FRONT_END, "The page's server", front_end_work, FRONT_END_DEADLINE),
+            child_spec(FRONT_END, "The page's server", front_end, FRONT_END_DEADLINE),
             child_spec(
                 ARM, "The arm's process", partial(_run, RUN_ARM, facts), ARM_DEADLINE, keeps=True
             ),
@@ -170,8 +160,6 @@ class _Server:
             ),
         )
         supervisor = Supervisor(specs, stopping)
-        if event_log is not None:
-            supervisor.on_restart = event_log.restart
         try:
             supervisor.start()
             supervisor.wait_for(ARM, READY)
@@ -189,8 +177,8 @@ class _Server:
                 lines = self.sockets.lines
                 if lines is not None:
                     say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
-                if event_log is not None:
-                    say(f"Event log: {event_log.folder}")
+                if (log_in := log_folder(options, port)) is not None:
+                    say(f"Event log: {log_in}")
                 for added in extra:
                     say(added.description)
                 say(
@@ -201,8 +189,6 @@ class _Server:
             return supervisor.robot
         finally:
             supervisor.stop()
-            # The event log is complete once the pipe of the last front end has ended.
-            front_end_work.close()
             os.close(claimed)
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -210,31 +196,6 @@ class _Server:
 def _run(target: str, *arguments: object) -> None:
     """Run the function that ``target`` names, in the process that was started for it."""
     load(target)(*arguments)
-
-
-class _FrontendWork:
-    """Returns the function of each front end that is started, with a new pipe to the event log."""
-
-    def __init__(self, facts: ServerFacts, sockets: Sockets, event_log: DiskLog | None) -> None:
-        self._facts, self._sockets = facts, sockets
-        self._event_log = event_log
-        self._sender: Connection | None = None
-
-    def __call__(self, _kept: object) -> Work:
-        # The front end before has ended, so its pipe must end too.
-        self.close()
-        ends: Any = multiprocessing.get_context("spawn").Pipe()
-        receiver, self._sender = ends
-        if self._event_log is None:
-            receiver.close()
-        else:
-            self._event_log.attach(receiver)
-        return partial(run_frontend, self._facts, self._sockets, self._sender)
-
-    def close(self) -> None:
-        """End the pipe of the newest front end, so that its reader ends too."""
-        if self._sender is not None:
-            self._sender.close()
 
 
 def _set_on_signals(stopping: threading.Event) -> None:

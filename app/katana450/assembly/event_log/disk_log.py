@@ -1,8 +1,7 @@
-"""The event log of one server, written by the process that starts the others and outlives them.
+"""The event log of one server: its files, and the thread that writes them.
 
-A record is one JSON object per line, of bounded size and without secrets. The process takes records
-from all others and writes them in one thread. Nobody waits for the disk. While it is full or cannot
-be written, the records are counted, and the thread tries again.
+A line is one record, a JSON object in plain ASCII. Nobody waits for the disk. While it is full or
+cannot be written, the records are counted, and the thread tries again.
 """
 
 from __future__ import annotations
@@ -14,26 +13,19 @@ import threading
 import time
 from contextlib import suppress
 from datetime import UTC, datetime
-from multiprocessing.connection import Connection
 from pathlib import Path
-from queue import Empty, SimpleQueue
-from typing import Any
+from queue import Empty
 
-from katana450.arm.runtime.pipes.guarded_pipe import GuardedPipe
-from katana450.arm.runtime.readiness import writable
-from katana450.platform_support import claim_file, open_bytes, state_folder
+from katana450.arm.control.actor import SERVER
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.assembly.event_log.record_maker import Record, RecordMaker, record
+from katana450.platform_support import claim_file, open_bytes
+from katana450.server.service.recorder import Note, Recorder
 
 log = logging.getLogger(__name__)
 
-Record = dict[str, Any]
-"""A record: ``time``, ``t`` and ``kind``, and those of ``who``, ``what``, ``grounds``, ``outcome``
-and ``why`` that are known."""
-
 MAX_LINE_BYTES = 4096
 """Maximum length of a line. The content of a longer record is replaced by its length."""
-
-MAX_TEXT = 200
-"""Maximum length of a text in a record, in characters."""
 
 PRESENT = "events.jsonl"
 """Name of the file to which records are appended."""
@@ -44,8 +36,11 @@ MAX_FILE_BYTES = 10_000_000
 MAX_FILES = 10
 """Maximum number of files; the oldest is deleted when a new one begins."""
 
-MAX_QUEUED = 10_000
-"""Maximum number of records that wait for the thread; more are counted and dropped."""
+COLLECTING = 0.02
+"""[s] Minimum time between two turns of the thread, so that a stream wakes it rarely."""
+
+TURN = 0.25
+"""[s] Maximum time between two turns while a record is due or the log cannot be written."""
 
 RETRY_INTERVAL = 1.0
 """[s] Time between two attempts to open a log that cannot be written."""
@@ -55,110 +50,79 @@ CLOSE_TIMEOUT = 2.0
 
 
 class DiskLog:
-    """The event log of this server in a folder, which is created when needed."""
+    """Writes the notes of ``recorder`` to a folder, which is created when needed."""
 
     def __init__(
         self,
+        recorder: Recorder,
         folder: Path,
         port: int,
         max_file_bytes: int = MAX_FILE_BYTES,
         max_files: int = MAX_FILES,
     ) -> None:
         """Start the thread, and write the start of the server on ``port``."""
+        self._recorder = recorder
+        self._maker = RecordMaker()
         self._file = LogFile(folder, max_file_bytes, max_files)
-        self._queue: SimpleQueue[Record | None] = SimpleQueue()
-        self._lost = self._dropped = 0
-        self._problem = ""
-        self._retry_at = 0.0
-        self._pipes: list[Connection] = []
-        self._listeners: list[threading.Thread] = []
-        self._attaching = threading.Lock()
+        self._lost, self._retry_at = 0, 0.0
+        self._now = MonotonicClock().now
         self._thread = threading.Thread(target=self._run, name="event log", daemon=True)
+        recorder.enabled = True
+        self._port = port
         self._thread.start()
-        self._note("start", {"port": port, "pid": os.getpid()})
 
-    @property
-    def folder(self) -> Path:
-        """The folder."""
-        return self._file.folder
-
-    def put(self, content: Record) -> None:
-        """Write ``content`` soon; drop and count it if too many records wait."""
-        if self._queue.qsize() < MAX_QUEUED:
-            self._queue.put(content)
-        else:
-            self._dropped += 1
-
-    def attach(self, pipe: Connection) -> None:
-        """Write the records of another process, which sends lists of them by ``pipe``.
-
-        A problem of the writer is sent back as a text, and ``""`` when it is over.
-        """
-        with self._attaching:
-            self._pipes.append(pipe)
-            if self._problem:
-                _tell(pipe, self._problem)
-        thread = threading.Thread(target=self._listen, args=(pipe,), name="records", daemon=True)
-        self._listeners = [*filter(threading.Thread.is_alive, self._listeners), thread]
-        thread.start()
-
-    def restart(self, process: str, status: int | None) -> None:
-        """Record that ``process`` ended with ``status``, and is started again."""
-        self._note("restart", {"process": process, "status": status})
-
-    def close(self, *, requested: bool, timeout: float = CLOSE_TIMEOUT) -> None:
-        """Record the end of the server, and write what waits. ``requested``: by a signal.
+    def close(self, timeout: float = CLOSE_TIMEOUT) -> None:
+        """Write the end of the server after all notes.
 
         Return after at most ``timeout`` [s], although a slow disk may need longer.
         """
-        end = time.monotonic() + timeout
-        for thread in self._listeners:
-            thread.join(max(end - time.monotonic(), 0.0))
-        cause = "requested" if requested else "the server could not start, or failed"
-        self._note("end", {"cause": cause})
-        self._queue.put(None)
-        self._thread.join(max(end - time.monotonic(), 0.0))
-
-    def _note(self, kind: str, what: dict[str, Any]) -> None:
-        self.put(record(kind, what, who={"name": "the server", "channel": "server"}))
-
-    def _listen(self, pipe: Connection) -> None:
-        with GuardedPipe(pipe, "The pipe of the event log"):
-            while True:
-                for content in pipe.recv():
-                    self.put(content)
-        with self._attaching:
-            self._pipes.remove(pipe)
-        pipe.close()
+        self._recorder.note("end", SERVER)
+        self._recorder.enabled = False
+        self._recorder.notes.put(None)
+        self._thread.join(timeout)
 
     def _run(self) -> None:
-        closing = False
+        closing, recorder = False, self._recorder
+        # Before notes that waited for this thread.
+        what = {"port": self._port, "pid": os.getpid()}
+        who = {"name": SERVER.name, "channel": SERVER.channel.value}
+        self._write([record("start", what, who=who)], closing=False)
         while not closing:
-            batch: list[Record | None] = []
+            notes: list[Note | None] = []
+            waits = self._maker.is_idle and not recorder.problem
             with suppress(Empty):
-                batch.append(self._queue.get(timeout=RETRY_INTERVAL if self._problem else None))
+                notes.append(recorder.notes.get(timeout=None if waits else TURN))
                 while True:
-                    batch.append(self._queue.get_nowait())
-            closing = None in batch
-            self._write([content for content in batch if content is not None], closing=closing)
+                    notes.append(recorder.notes.get_nowait())
+            closing = None in notes
+            records = self._made([note for note in notes if note is not None], closing=closing)
+            self._write(records, closing=closing)
+            time.sleep(0.0 if closing else COLLECTING)
         self._file.close()
 
-    def _write(self, batch: list[Record], *, closing: bool) -> None:
-        dropped, self._dropped = self._dropped, 0
-        self._lost += dropped
-        now = time.monotonic()
-        if self._problem and now < self._retry_at and not closing:
-            self._lost += len(batch)
+    def _made(self, notes: list[Note], *, closing: bool) -> list[Record]:
+        lost, self._recorder.lost = self._recorder.lost, 0
+        self._lost += lost
+        try:
+            return self._maker.made(notes, self._now(), closing=closing)
+        except Exception:
+            log.exception("The event log met an error; it continues with the next event.")
+            self._lost += len(notes)
+            return []
+
+    def _write(self, records: list[Record], *, closing: bool) -> None:
+        problem, left = self._recorder.problem, len(records)
+        if problem and time.monotonic() < self._retry_at and not closing:
+            self._lost += left
             return
-        left = len(batch)
         try:
             if not self._file.is_open:
                 self._file.open()
             if self._lost:
-                why = self._problem or "Too many events came at once."
+                why = problem or "Too many events came at once."
                 self._file.append(record("lost", {"count": self._lost}, why=why))
                 self._lost = 0
-            for content in batch:
+            for content in records:
                 self._file.append(content)
                 left -= 1
         except Exception as error:
@@ -166,39 +130,21 @@ class DiskLog:
             self._lost += left
             self._fail(error)
         else:
-            if self._problem:
+            if problem:
                 log.warning("The event log in %s is written again.", self._file.folder)
-                self._report("")
+                self._recorder.problem = ""
 
     def _fail(self, error: Exception) -> None:
         self._file.close()
         self._retry_at = time.monotonic() + RETRY_INTERVAL
-        if not self._problem:
+        if not self._recorder.problem:
             why = error.strerror if isinstance(error, OSError) else None
             if isinstance(error, BlockingIOError):
                 why = "another server writes there"
             # Everybody sees this text, so it does not name the folder.
             problem = f"The event log cannot be written: {why or error}."
             log.error("%s Folder: %s. Later records are counted.", problem, self._file.folder)
-            self._report(problem)
-
-    def _report(self, problem: str) -> None:
-        with self._attaching:
-            self._problem = problem
-            for pipe in self._pipes:
-                _tell(pipe, problem)
-
-
-def _tell(pipe: Connection, problem: str) -> None:
-    """Send ``problem`` to a process that may have ended, or that no longer reads."""
-    with suppress(OSError):
-        if writable(pipe.fileno()):
-            pipe.send(problem)
-
-
-def default_folder(port: int) -> Path:
-    """Return the folder of the event log of the server on ``port``."""
-    return state_folder() / "katana450" / "events" / f"port-{port}"
+            self._recorder.problem = problem
 
 
 def log_files(folder: Path) -> list[Path]:
@@ -283,19 +229,6 @@ def _ends_line(path: Path) -> bool:
         return file.read() == b"\n"
 
 
-def utc(seconds: float) -> str:
-    """Return ``seconds`` since the epoch as ISO time in UTC with milliseconds."""
-    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds")[:-6] + "Z"
-
-
-def record(kind: str, what: Any = None, **more: Any) -> Record:
-    """Return a record of the present time. ``more``: further fields."""
-    content: Record = {"time": utc(time.time()), "t": round(time.perf_counter(), 3), "kind": kind}
-    if what is not None:
-        content["what"] = what
-    return content | more
-
-
 def encoded(content: Record) -> bytes:
     """Return ``content`` as a line with its line feed.
 
@@ -307,9 +240,3 @@ def encoded(content: Record) -> bytes:
         short: Record = {key: content[key] for key in ("time", "t", "kind") if key in content}
         line = json.dumps(short | {"what": {"omitted_bytes": len(line)}}, separators=(",", ":"))
     return line.encode("ascii") + b"\n"
-
-
-def text(value: object) -> str:
-    """Return ``value`` as a text of at most ``MAX_TEXT`` characters."""
-    words = str(value)
-    return words if len(words) <= MAX_TEXT else f"{words[:MAX_TEXT]}... ({len(words)} characters)"

@@ -1,4 +1,4 @@
-"""Records of the event log, made from notes in a thread, and sent to the process that writes them.
+"""Records of the event log, made from notes: JSON objects of bounded size and without secrets.
 
 Who did what, on what grounds, with what outcome. Commands that come in streams make one record, of
 the first. Of the records that one participant can cause, more than a limit are counted, so that
@@ -7,13 +7,9 @@ nobody can quickly fill the log, or displace older records by new ones.
 
 from __future__ import annotations
 
-import logging
 import math
-import threading
 import time
-from contextlib import suppress
-from multiprocessing.connection import Connection
-from queue import Empty
+from datetime import UTC, datetime
 from typing import Any
 
 import msgspec
@@ -24,11 +20,16 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Act, Command, content_names
 from katana450.arm.control.state.event_log import LogEntry
 from katana450.arm.control.state.messages import finding_text
-from katana450.arm.runtime.clock import MonotonicClock
-from katana450.assembly.event_log.disk_log import Record, record, text, utc
 from katana450.maths.planning.plan import Plan
 from katana450.server.service.limits import SenderBuckets, TokenBucket
-from katana450.server.service.recorder import Note, Recorder
+from katana450.server.service.recorder import Note
+
+Record = dict[str, Any]
+"""A record: ``time``, ``t`` and ``kind``, and those of ``who``, ``what``, ``grounds``, ``outcome``
+and ``why`` that are known."""
+
+MAX_TEXT = 200
+"""Maximum length of a text in a record, in characters."""
 
 STREAM_GAP = 1.0
 """[s] Time without another command after which a stream has ended."""
@@ -53,21 +54,6 @@ leaves the others as they are."""
 
 EVERYBODY_FACTOR = 4.0
 """Limits of all participants together, in limits of one."""
-
-log = logging.getLogger(__name__)
-
-COLLECTING = 0.02
-"""[s] Minimum time between two turns of the thread, so that a stream wakes it rarely."""
-
-TURN = 0.25
-"""[s] Maximum time between two turns while a summary is open."""
-
-IDLE_TURN = 1.0
-"""[s] Maximum time between two turns otherwise, after which a problem of the writer is known."""
-
-CLOSE_TIMEOUT = 1.0
-"""[s] Time for the last records at the end of the process."""
-
 
 MAX_ITEMS = 16
 """Maximum number of items of a list or of fields in a record; a pose has 16 numbers."""
@@ -244,58 +230,6 @@ class RecordLimits:
         return {"kind": "more", "what": what, "t": round(t, 3)}
 
 
-class RecordSender:
-    """Sends records of the notes of ``recorder`` to a ``DiskLog`` at the end of ``pipe``."""
-
-    def __init__(self, recorder: Recorder, pipe: Connection) -> None:
-        """Start the thread."""
-        self._recorder = recorder
-        self._pipe = pipe
-        self._maker = RecordMaker()
-        self._now = MonotonicClock().now
-        recorder.enabled = True
-        self._thread = threading.Thread(target=self._run, name="records", daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Send the records of all notes, and end the thread."""
-        self._recorder.enabled = False
-        self._recorder.notes.put(None)
-        self._thread.join(CLOSE_TIMEOUT)
-
-    def _run(self) -> None:
-        closing, waiting = False, self._recorder.notes
-        try:
-            while not closing:
-                notes: list[Note | None] = []
-                with suppress(Empty):
-                    notes.append(waiting.get(timeout=IDLE_TURN if self._maker.is_idle else TURN))
-                    while True:
-                        notes.append(waiting.get_nowait())
-                closing = None in notes
-                records = self._made([note for note in notes if note is not None], closing=closing)
-                if records:
-                    self._pipe.send(records)
-                while self._pipe.poll():
-                    self._recorder.problem = str(self._pipe.recv())
-                time.sleep(0.0 if closing else COLLECTING)
-        except (EOFError, OSError):
-            # The other process has ended, and this one will.
-            self._recorder.enabled = False
-
-    def _made(self, notes: list[Note], *, closing: bool) -> list[Record]:
-        recorder, records = self._recorder, list[Record]()
-        lost, recorder.lost = recorder.lost, 0
-        try:
-            records = self._maker.made(notes, self._now(), closing=closing)
-        except Exception:
-            log.exception("The recorder met an error; it continues with the next event.")
-            lost += len(notes)
-        if lost:
-            records.append(record("lost", {"count": lost}, why="Too many events came at once."))
-        return records
-
-
 def content_of(what: Any) -> Any:
     """Return ``what``, an act or another value, as a JSON value of bounded size."""
     if not isinstance(what, Act):
@@ -350,3 +284,22 @@ def _bounded(value: Any, depth: int = 0) -> Any:
         case list() | tuple():
             return [_bounded(entry, depth + 1) for entry in value]
     return value
+
+
+def utc(seconds: float) -> str:
+    """Return ``seconds`` since the epoch as ISO time in UTC with milliseconds."""
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds")[:-6] + "Z"
+
+
+def text(value: object) -> str:
+    """Return ``value`` as a text of at most ``MAX_TEXT`` characters."""
+    words = str(value)
+    return words if len(words) <= MAX_TEXT else f"{words[:MAX_TEXT]}... ({len(words)} characters)"
+
+
+def record(kind: str, what: Any = None, **more: Any) -> Record:
+    """Return a record of the present time. ``more``: further fields."""
+    content: Record = {"time": utc(time.time()), "t": round(time.perf_counter(), 3), "kind": kind}
+    if what is not None:
+        content["what"] = what
+    return content | more

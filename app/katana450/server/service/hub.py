@@ -98,8 +98,6 @@ class Hub:
         self._known = KnownPages()
         self._ticked = clock()
         self._driver_watch = DriverWatch(self.gate, self._ticked)
-        self.supervisor_problem: Callable[[], str | None] = lambda: None
-        """Returns what is wrong with the supervisor of this process, in words."""
         self.replace_robot: Callable[[Path], None] | None = None
         """Starts the server again with the robot in a file; None where that is not possible."""
         self.shown: dict[str, Any] = {}

@@ -52,7 +52,7 @@ def health(hub: Hub) -> str | None:
         return f"No answer from the arm's process for {age:.1f} s."
     episodes = hub.shown.get("episodes") or {}
     unwritten = hub.recorder.problem or episodes.get("problem")
-    return hub.supervisor_problem() or hub.stop_path.problem or unwritten or None
+    return hub.stop_path.problem or unwritten or None
 
 
 def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:

@@ -1,4 +1,4 @@
-"""Channels that receive requests and send answers.
+"""Channels that receive requests and send answers, and the control socket of a page.
 
 They are separate from the connections of viser, which delays messages and keeps only the newest.
 """
@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, ClassVar, Protocol
 
 import msgspec
@@ -19,16 +20,17 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from katana450.arm.control.commands.act import Id
 from katana450.errors import InputError, LateError, LeaseError
 from katana450.server.api import answers, requests
-from katana450.server.service.budget import Budget, BusyError
+from katana450.server.service import status
+from katana450.server.service.budget import Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import ARRIVAL, LATE_RETRY, PING, LastHeartbeat
 from katana450.server.service.hub import Hub
-from katana450.server.service.identity import Identity
+from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.limits import TokenBucket
 from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.service.people import Connection
-from katana450.server.web.admission import LIMIT_CLOSE_CODE
+from katana450.server.web.admission import LIMIT_CLOSE_CODE, address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 
 log = logging.getLogger(__name__)
@@ -41,6 +43,17 @@ BAD_REQUEST_CLOSE_CODE = 1008
 
 CLOSE_FRAME_TIMEOUT = 1.0
 """Timeout [s] for sending the close frame: some clients never read it."""
+
+
+PAGE_REQUESTS = 160.0, 320.0
+"""Maximum rate [1/s] and burst of requests: per second ten heartbeats, 25 jogs, 30 queries, and the
+use of knobs and buttons."""
+
+PUSH_EVERY = 0.1
+"""Interval [s] of status updates; twice as long while nobody drives."""
+
+PAGE_BAD_REQUESTS = 0.0, 4.0
+"""The same of invalid requests: the fifth closes the socket."""
 
 
 class GoneError(Exception):
@@ -264,3 +277,60 @@ class Channel(ABC):
 
     async def _send_json(self, notice: Any) -> None:
         await self._line.send(msgspec.json.encode(notice).decode())
+
+
+class ControlSocket(Channel):
+    """Control socket of one page: it receives requests such as STOP and jog.
+
+    It sends changes of the status, less often if it is slow. States are sent only on request, a few
+    at a time, so a slow connection has no backlog of them.
+    """
+
+    often, bad = PAGE_REQUESTS, PAGE_BAD_REQUESTS
+
+    def __init__(self, hub: Hub, line: JsonChannel, budget: Budget) -> None:
+        super().__init__(hub, line, budget)
+        self._sent: dict[str, Any] = {}
+        self._checked_at = float("-inf")
+
+    def answer(self, participant: Participant, request: requests.Request) -> None:
+        """Execute ``request``, send its answer, and confirm the receipt of a stop."""
+        super().answer(participant, request)
+        if isinstance(request, requests.Stop):
+            self.notify({"is": "stopped"})
+        if not isinstance(request, requests.Heartbeat | requests.Jog):
+            self.wake()
+
+    def unasked(self, *, urgent: bool) -> tuple[Any, float | None]:
+        """Return the changes of the status, or None, and the time until the next call [s]."""
+        t = self.hub.clock()
+        pause = PUSH_EVERY if self.hub.lease.holder is not None else 2 * PUSH_EVERY
+        if self.participant is None or (not urgent and t - self._checked_at < PUSH_EVERY / 2):
+            return None, pause
+        self._checked_at = t
+        now = status.common(self.hub) | status.of(self.hub, self.participant)
+        changes = {key: value for key, value in now.items() if self._sent.get(key, self) != value}
+        self._sent = now
+        return {"is": "status", **changes} if changes else None, pause
+
+
+async def serve_page(
+    hub: Hub, authenticator: Authenticator, budgets: Budgets, socket: WebSocket
+) -> None:
+    """Serve an accepted control socket until it closes or its client is no longer authorised."""
+    identity = authenticator.identity(socket.cookies)
+    page = socket.query_params.get("page", "")
+    if identity is None or not PAGE.fullmatch(page):
+        await socket.close(SIGN_IN_CLOSE_CODE, "Sign in at the start page first.")
+        return
+    line = WebSocketJsonChannel(socket)
+    control = ControlSocket(hub, line, budgets.of(identity.session))
+    identity = replace(identity, address=address_of(socket))
+    participant = hub.join(identity, page, control.notify, line.arrival)
+    control.greet(participant)
+    try:
+        await control.serve(
+            authenticator, lambda: authenticator.identity(socket.cookies), participant, identity
+        )
+    finally:
+        hub.leave(participant)
