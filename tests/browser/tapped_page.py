@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from katana450.assembly.page_files import put_together
+from katana450.assembly.page_routes import put_together
 from katana450.server.web.static_files import contents
 
 TAPPED = """

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from katana450.arm.control.lease import Role
-from katana450.assembly import page_files
+from katana450.assembly import page_routes
 from katana450.client import connect
 from katana450.resources import STATIC
 from katana450.server.api import requests
@@ -212,9 +212,9 @@ def test_scripts_are_sent_without_comments_at_the_same_lines() -> None:
 
 
 def test_the_page_is_small() -> None:
-    sent = {name: len(file.packed) for name, file in page_files.load().items()}
+    sent = {name: len(file.packed) for name, file in page_routes.page_files().items()}
     # The scripts of each document are sent in one file. Those in folders are loaded on first use.
-    ours = ("index.html", "page.css", page_files.PAGE_SCRIPTS, "link.js", "icon.svg")
+    ours = ("index.html", "page.css", page_routes.PAGE_SCRIPTS, "link.js", "icon.svg")
     assert sum(sent[name] for name in ours) < 30_300
     assert sum(sent[name] for name in (*ours, SCRIPTS)) < 39_600
     # The modules in these scripts are also there alone, for people.
@@ -234,10 +234,10 @@ def test_the_page_is_small() -> None:
 
 
 def test_modules_of_each_document_are_sent_in_one_script_after_those_they_import() -> None:
-    sent = page_files.load()
+    sent = page_routes.page_files()
     page = sent["index.html"].content.decode()
-    assert re.findall(r'<script[^>]* src="([^"]+)"', page) == [f"static/{page_files.PAGE_SCRIPTS}"]
-    scripts = sent[page_files.PAGE_SCRIPTS].content.decode()
+    assert re.findall(r'<script[^>]* src="([^"]+)"', page) == [f"static/{page_routes.PAGE_SCRIPTS}"]
+    scripts = sent[page_routes.PAGE_SCRIPTS].content.decode()
     assert scripts.index("function element(") < scripts.index("new Worker(")
     assert "interceptMessages" in sent[SCRIPTS].content.decode()
     assert len(re.findall(r"<script>.*?</script>", page, re.DOTALL)) == 1
@@ -250,7 +250,7 @@ def test_modules_are_put_together_once_each_and_files_that_load_later_keep_their
         "b.js": b'import "./in/a.js";\nexport const later = () => import("./in/later.js");\n',
         "in/a.js": b'export function a() {}\nexport const load = () => import("../b.js");\n',
     }
-    script = page_files.put_together("page.js", files).decode()
+    script = page_routes.put_together("page.js", files).decode()
     assert script.count("function a()") == 1
     assert script.index("function a()") < script.index("later") < script.index("say(one, b)")
     assert 'import("./in/later.js")' in script
@@ -258,7 +258,7 @@ def test_modules_are_put_together_once_each_and_files_that_load_later_keep_their
     assert "const { a: one } = m0;" in script
     files["b.js"] = b"export default 1;\n"
     with pytest.raises(ValueError, match=r"b\.js cannot be put together: export default 1;"):
-        page_files.put_together("page.js", files)
+        page_routes.put_together("page.js", files)
 
 
 @pytest.mark.long

@@ -47,7 +47,7 @@ declare namespace Api {
   interface Fill { do: "fill"; ml: number; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
   interface Finding { reason: string; text: string; amount: number | null; unit: string | null; axis: number | null;
-    parts: [string, string] | null; seconds: number | null; }
+    parts: [string, string] | null; }
   interface FingerForce { finger: string; force: number; }
   type Frame = "base" | "shoulder";
   interface Get { do: "get"; id?: number | string | null; revocations?: number | null; made?: number | null;
@@ -87,8 +87,8 @@ declare namespace Api {
   interface Margins { limit: number; axis: number; limits: number[]; smallest_singular_value: number;
     clearance: number | null; parts: [string, string] | null; }
   interface MeasuredArm { mode: string; note: string; acts: string[]; t: number; expected: number[];
-    tracking_error: number; axis: number; speeds: number[] | null; round_trip: number; stop_time: number | null;
-    stop_angle: number | null; stop_distance: number | null; sensors: number[]; }
+    speeds: number[] | null; round_trip: number; stop_time: number | null; stop_angle: number | null;
+    stop_distance: number | null; sensors: number[]; }
   interface Mesh { is: "mesh"; id?: number | string | null; key: string; name: string; text: string; size: number[];
     triangles: number; scale?: number; }
   interface MotionEnd { how: string; why: string; seconds: number; q: number[]; gripper: number; T: number[][] | null; }

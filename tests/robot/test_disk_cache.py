@@ -18,7 +18,7 @@ from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.creases import Drawn
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.surfaces import shapes_of
-from katana450.assembly import page_files
+from katana450.assembly import page_routes
 from katana450.disk_cache import kept
 from katana450.extensions.bodies.pieces import pieces
 from katana450.maths.geometry.arrays import FloatArray
@@ -258,7 +258,7 @@ def test_every_kind_of_value_is_found_again(folder: Path) -> None:
         partial(shapes_of, visual),
         partial(surface, visual),
         partial(visual.kept, lambda: _merged(visual), Drawn),
-        page_files.load,
+        page_routes.page_files,
         viser_page.load,
     ):
         read()

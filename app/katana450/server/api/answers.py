@@ -180,8 +180,6 @@ class MeasuredArm(msgspec.Struct, frozen=True, kw_only=True):
         acts: Acts that are possible now, see ``operate_arm``.
         t: Time of the measurement [s], on the clock of the state.
         expected: (n + 1,) Joints and finger joint where the arm should have been then [rad].
-        tracking_error: Maximum difference of a joint from there [rad].
-        axis: Number of that joint, counted from 1.
         speeds: (n + 1,) Measured speeds [rad/s]; null if they are not measured.
         round_trip: Time of the newest exchange with the arm [s].
         stop_time: Time to rest of the newest stop, as measured [s]; null before the first.
@@ -195,8 +193,6 @@ class MeasuredArm(msgspec.Struct, frozen=True, kw_only=True):
     acts: list[str]
     t: float
     expected: Numbers
-    tracking_error: float
-    axis: int
     speeds: Numbers | None
     round_trip: float
     stop_time: float | None

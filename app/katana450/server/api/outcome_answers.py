@@ -32,7 +32,6 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
         unit: Unit of ``amount``.
         axis: Number of the joint, counted from 1.
         parts: The two parts that are about to meet.
-        seconds: Duration of a stop [s].
     """
 
     reason: str
@@ -41,7 +40,6 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     unit: str | None = None
     axis: int | None = None
     parts: tuple[str, str] | None = None
-    seconds: float | None = None
 
 
 class PartRefusal(msgspec.Struct, frozen=True, kw_only=True):

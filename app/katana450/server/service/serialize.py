@@ -13,7 +13,6 @@ from katana450.arm.control.objects.environment import Hand
 from katana450.arm.control.objects.grip import FINGER_FORCE, finger_forces, touching
 from katana450.arm.control.objects.pouring import Pouring
 from katana450.arm.control.session.outcome import reason
-from katana450.arm.control.session.supervision import tracking_error
 from katana450.arm.control.session.tool_targets import BranchOption
 from katana450.arm.control.state import state as control
 from katana450.arm.control.state.arm_report import ArmReport
@@ -72,7 +71,6 @@ def finding(cause: control.Finding) -> answers.Finding:
         unit=unit,
         axis=None if cause.axis is None else cause.axis + 1,
         parts=cause.parts,
-        seconds=cause.time if cause.reason is control.Reason.STOPPED else None,
     )
 
 
@@ -144,7 +142,7 @@ def _of_snapshot(arm: ArmHandle, snapshot: Snapshot) -> dict[str, Any]:
         "speed": now.speed,
         "silence_profile": arm.profile.value,
         "water": water(arm.session.pouring, now),
-        "arm": None if now.report is None else measured_arm(now, now.report),
+        "arm": None if now.report is None else measured_arm(now.report),
         **(NO_TOOL if mounted is None else _of_tool(mounted, arm.margins, now)),
     }
 
@@ -161,9 +159,8 @@ def touch(hand: Hand, now: control.State) -> answers.Touch:
     )
 
 
-def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
+def measured_arm(report: ArmReport) -> answers.MeasuredArm:
     """Return the report of a driver as a part of an answer."""
-    error, axis = tracking_error(report, now.q)
     stop = report.measured_stop
     return answers.MeasuredArm(
         mode=report.mode.value,
@@ -171,8 +168,6 @@ def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
         acts=[act.value for act in report.mode.acts],
         t=report.t,
         expected=report.expected.tolist(),
-        tracking_error=error,
-        axis=axis + 1,
         speeds=None if report.speeds is None else report.speeds.tolist(),
         round_trip=report.round_trip,
         stop_time=None if stop is None else stop.time,
