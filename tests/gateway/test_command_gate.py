@@ -5,9 +5,7 @@ from __future__ import annotations
 import ast
 import asyncio
 import threading
-from argparse import Namespace
 from collections.abc import Iterator
-from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,11 +18,8 @@ import katana450
 from katana450.arm.control.actor import SERVER, Actor, Grounds
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Role
-from katana450.arm.control.session.outcome import DROPPED
-from katana450.arm.control.state.state import ACCEPTED, Finding, Outcome, Reason
+from katana450.arm.control.state.state import Finding, Reason
 from katana450.errors import LeaseError
-from katana450.extensions.undo import UndoRequests
-from katana450.server.api import requests
 from katana450.server.service.hub import TICK
 from katana450.server.service.participants import Participant
 from katana450.server.view.controls import listener
@@ -217,32 +212,6 @@ def test_event_of_a_browser_without_a_gesture_has_no_actor(
     for client_id in (None, CLIENT):
         with pytest.raises(LeaseError, match="start page"):
             gestures.actor(client_id)
-
-
-@pytest.mark.parametrize(
-    ("outcome", "meanwhile", "left"),
-    [(ACCEPTED, False, []), (DROPPED, False, ["speed"]), (DROPPED, True, [])],
-)
-def test_undone_change_is_kept_only_if_the_arm_refuses_its_inverse(
-    table: Table, outcome: Outcome, meanwhile: bool, left: list[str]
-) -> None:
-    handler, driver = UndoRequests(table.hub, Namespace()), table.join(PAGES[0])
-    reported: Future[Outcome] = Future()
-    table.arm.outcome = lambda _ticket: reported
-
-    def undoable() -> list[str]:
-        names: list[str] = handler.page_status(driver)["undo"]
-        return names
-
-    table.hub.move(driver, cmd.Speed(0.5))
-    assert undoable() == ["speed"]
-    handler.handle(driver, requests.Undo())
-    assert undoable() == []
-    if meanwhile:
-        # Its undoing would now also undo this one.
-        table.hub.move(driver, cmd.Hold())
-    reported.set_result(outcome)
-    assert undoable() == left
 
 
 def test_command_counts_though_a_callback_after_its_delivery_fails(

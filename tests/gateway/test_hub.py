@@ -45,7 +45,6 @@ class FakeArm:
     arm: MountedArm
     loop_timing: Any
     session: Session
-    outcome: Any
     planning_failure = ""
 
     def __init__(self, state: State) -> None:

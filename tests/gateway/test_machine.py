@@ -5,11 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import yourdfpy
 
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import DescribedRobot, find_robot
@@ -44,27 +42,6 @@ def robot(described: DescribedRobot) -> Robot:
     assert not all(joints.slides)
     assert len(described.robot.joints) > joints.n
     return described.robot
-
-
-def somewhere(robot: Robot, seed: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    joints = robot.joint_group
-    return np.random.default_rng(seed).uniform(0.9 * joints.lower, 0.9 * joints.upper)
-
-
-def test_every_link_is_where_another_program_has_it(
-    program: Client, robot: Robot, path: Path
-) -> None:
-    urdf = yourdfpy.URDF.load(str(path), load_meshes=False)
-    for seed in range(3):
-        q = somewhere(robot, seed)
-        state = program.joints(q)
-        np.testing.assert_allclose(state.q, q, rtol=0, atol=1e-12)
-        # It gets the driven joints alone, and computes the following joints itself.
-        urdf.update_cfg(dict(zip(robot.joint_group.names, q.tolist(), strict=True)))
-        poses = robot.frames(robot.joint_values(np.array(state.q), state.gripper))
-        assert set(poses) == set(urdf.link_map)
-        for name, T in poses.items():
-            np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)
 
 
 def test_arm_answer_gives_the_reason_for_joints_only(
