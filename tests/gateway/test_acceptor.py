@@ -197,15 +197,6 @@ def test_ipv6_networks_count_as_one_prefix(one: str, other: str, *, same: bool) 
     assert (first == second) == same
 
 
-def test_hundreds_of_connections_wait_for_a_server_that_is_busy() -> None:
-    with listen("127.0.0.1", 0) as listening:
-        crowd = []
-        for _ in range(300):
-            crowd.append(socket.create_connection(listening.getsockname(), timeout=0.2))
-        for connection in crowd:
-            connection.close()
-
-
 @pytest.mark.parametrize(("soft", "hard"), [(256, 2048), (256, 512)])
 def test_descriptor_limit_is_raised_as_far_as_the_system_allows(soft: int, hard: int) -> None:
     program = (

@@ -21,12 +21,6 @@ from katana450.arm.robot.weight import loads_of
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
-from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.building.plan_state import PlanContext
-from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.run.program import compiled
-from katana450.extensions.programs.script.script import parse
-from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.statics import holding_torques
@@ -190,12 +184,6 @@ def test_nudge_is_limited_to_the_range_of_the_joint(session: Session) -> None:
     assert back.findings == ()
 
 
-@pytest.mark.parametrize("bad", [(6, 0.1), (0, 0.1), (1, math.nan), (True, 0.1)])
-def test_invalid_nudge_is_refused(session: Session, bad: tuple[int, float]) -> None:
-    with pytest.raises(InputError):
-        session.check(cmd.Nudge(*bad))
-
-
 def test_program_nudges_a_joint_of_a_real_server(program: Client) -> None:
     start = program.query(answers.State)
     state = program.nudge(1, 0.1)
@@ -211,21 +199,6 @@ def test_program_nudges_a_joint_of_a_real_server(program: Client) -> None:
     assert [finding.reason for finding in answer.findings] == ["axis limit"]
     with pytest.raises(RefusedError, match="no axis 9"):
         program.nudge(9, 0.1)
-
-
-def test_script_step_nudges(session: Session) -> None:
-    plan_context = PlanContext(session, np.eye(4))
-    state = session.begin(session.ready, 0.0, 0.0)
-    script = "steps:\n  - nudge: {axis: 1, by: 20}\n  - nudge: {axis: 1, by: -5}\n"
-    tasks = compiled(parse(script), plan_context, state).tasks
-    plans = [task.action.plan for task in tasks if isinstance(task.action, FollowPlan)]
-    assert len(plans) == 2
-    end = session.ready + np.deg2rad((15.0, 0.0, 0.0, 0.0, 0.0))
-    np.testing.assert_allclose(plans[-1].end, end, rtol=0, atol=1e-12)
-    with pytest.raises(ScriptError, match="line 2"):
-        compiled(parse("steps:\n  - nudge: {axis: 2, by: 300}\n"), plan_context, state)
-    with pytest.raises(ScriptError, match="axis"):
-        parse("steps:\n  - nudge: {by: 3}\n")
 
 
 def test_joint_stream_is_followed_and_ends_at_rest(program: Client) -> None:
@@ -297,18 +270,6 @@ def check_printed(program: Client, T: FloatArray, decimals: int) -> None:
     assert 1e-3 * rounding < accepted.rotation_misfit < 4.0 * rounding
     state = program.go(requests.Pose(T=printed))
     np.testing.assert_allclose(np.array(state.T), T, rtol=0, atol=10.0 * rounding)
-
-
-def test_object_is_placed_at_a_printed_pose(program: Client) -> None:
-    T = np.eye(4)
-    T[:3, :3] = so3.from_rpy(0.0, 0.0, 0.7)
-    T[:3, 3] = 0.3, -0.3, 0.0
-    printed = T.round(4)
-    placed = program.ask(requests.Place(name="block", shape=Shape.BOX, size=[0.02] * 3, T=printed))
-    assert isinstance(placed, answers.Done)
-    assert placed.rotation_misfit is not None
-    assert placed.rotation_misfit > 1e-6
-    program.ask(requests.Remove(name="block"))
 
 
 def test_skewed_pose_is_refused_with_the_error(program: Client) -> None:

@@ -20,7 +20,7 @@ from katana450.arm.control.state.state import ActiveStop, Finding, Reason, State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.pipes.state_publisher import Snapshot
-from katana450.errors import InputError, LeaseError
+from katana450.errors import LeaseError
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api import answers, requests
 from katana450.server.service.arm_handle import ArmHandle
@@ -31,7 +31,6 @@ from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, actor_of, key_of
 from katana450.server.service.runner import Runner
-from katana450.server.service.serialize import once
 from katana450.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")
@@ -381,14 +380,3 @@ def test_branches_are_computed_once_per_snapshot() -> None:
     arm.snapshot = _snapshot()
     Dispatcher(hub).query("branches")
     assert len(computed) == 2
-
-
-def test_error_is_not_cached() -> None:
-    snapshot = _snapshot()
-
-    def fail() -> int:
-        raise InputError("no branches")
-
-    with pytest.raises(InputError):
-        once(snapshot, "a", fail)
-    assert once(snapshot, "a", lambda: 1) == 1

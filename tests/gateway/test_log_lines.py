@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 import pytest
 
-from katana450.assembly.log_output import LineFormatter, RepetitionFilter, printable
+from katana450.assembly.log_output import LineFormatter, RepetitionFilter
 from katana450.client import connect
 from katana450.server.api import requests
 from tests.browser.server import AppServer
@@ -66,11 +66,6 @@ def test_flood_makes_few_lines_and_is_counted(monkeypatch: pytest.MonkeyPatch) -
     assert line is not None
     assert line.endswith("Invalid request from Eve. (and 980 more such lines before)")
     assert "before" not in str(printed("Invalid request from %s.", "Eve"))
-
-
-def test_printable_text_is_left_as_it_is() -> None:
-    for text in ("", "Anna's arm: 5° ✓", "Ænna\u00a0".strip()):
-        assert printable(text) == text
 
 
 def test_log_names_the_person_who_stopped_the_arm(server: AppServer) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from argparse import Namespace
 from dataclasses import replace
 from typing import Any
@@ -173,17 +172,6 @@ def test_stop_that_another_person_clears_leaves_the_lease_to_the_owner(table: St
     table.hub.release_lease(other)
     table.hub.move(other, cmd.ClearStop())
     assert table.hub.lease.holder == other.person
-
-
-def test_run_during_planning_is_executed_after_it(table: Staged) -> None:
-    participant = table.join(PAGES[0])
-    table.programs.script(participant, SCRIPT, more=False, speed=1.0)
-    table.programs.steer(participant, ProgramOrder.RUN)
-    due = time.monotonic() + 10.0
-    while table.status in ("planning", "ready") and time.monotonic() < due:
-        table.wait(0.02, participant)
-        time.sleep(0.005)
-    assert table.status == "running"
 
 
 def test_run_from_before_a_stop_is_not_executed_after_it(table: Staged) -> None:

@@ -92,29 +92,6 @@ def test_program_is_paused_stepped_and_ended(arm: Client) -> None:
     assert state.holder is None
 
 
-def test_lease_can_be_taken_from_a_program(local: VirtualServer, arm: Client) -> None:
-    run(arm)
-    with local.connect("Boss") as boss:
-        boss.ask(requests.Take())
-        program = wait(boss, lambda program: program.status != "running", 1.0)
-        assert program.status == "stopped"
-        assert "taken" in program.why
-
-
-def test_errors_are_reported_with_their_lines(arm: Client) -> None:
-    program = planned(arm, "steps:\n  - hme\n  - wait: x\n")
-    assert program.status == "refused"
-    assert "line 2, column 5" in program.why
-    assert "line 3, column 11" in program.why
-    program = planned(arm, "steps:\n  - home\n  - line: {by: {z: -285}}\n")
-    assert "line 3" in program.why
-    assert "table" in program.why
-    program = planned(arm, "gripper: none\nsteps: [home]\n")
-    assert "without its gripper" in program.why
-    with pytest.raises(RefusedError, match="without its gripper"):
-        arm.ask(Steer(order=ProgramOrder.RUN))
-
-
 def test_script_that_is_too_long_is_refused(arm: Client) -> None:
     part = "#" * 900 + "\n"
     for _ in range(72):

@@ -127,13 +127,6 @@ def test_a_motion_longer_than_the_lease_of_a_silent_program_is_supervised(
     check_nothing_moves_later(watcher)
 
 
-def test_target_that_the_arm_cannot_reach_is_limited(local: VirtualServer, watcher: Client) -> None:
-    status, done = local.post(do="joint", axis=5, value=40.0, wait=30)
-    assert (status, done["outcome"], done["end"]["how"]) == (200, "limited", "limited")
-    assert "Axis 5 at its limit" in done["end"]["why"]
-    assert watcher.query(answers.State).holder is None
-
-
 def test_stop_of_anybody_ends_the_wait(local: VirtualServer, watcher: Client) -> None:
     with moving(local, watcher) as answer:
         watcher.stop()
@@ -275,15 +268,6 @@ def test_json_lines_and_websocket_have_the_same_wait(local: VirtualServer, watch
     assert done.end is not None
     assert done.end.how == "reached"
     assert watcher.query(answers.State).holder is None
-
-
-def test_closed_line_stops_the_arm(local: VirtualServer, watcher: Client) -> None:
-    slow(watcher)
-    with local.speaking("Broken") as rows:
-        rows.say(do="joints", q=THERE.tolist(), wait=30)
-        state_when(watcher, under_way)
-    state_when(watcher, lambda now: now.stopped == "Broken left while the arm moved.", 1.0)
-    watcher.clear_stop()
 
 
 def test_number_of_open_requests_is_bounded(local: VirtualServer, watcher: Client) -> None:
