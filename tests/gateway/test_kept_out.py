@@ -177,16 +177,6 @@ def test_name_of_somebody_who_is_away_stays_his(table: Table) -> None:
     table.hub.rename(second, "Window 2")
 
 
-def test_new_name_is_in_the_event_log(table: Table) -> None:
-    table.hub.recorder.enabled = True
-    window = table.join(PAGES[0])
-    table.hub.rename(window, "Ann")
-    notes = [table.hub.recorder.notes.get() for _ in range(table.hub.recorder.notes.qsize())]
-    (note,) = [entry for entry in notes if entry is not None and entry.kind == "rename"]
-    assert note.actor is not None
-    assert (note.actor.name, note.what) == ("Window 1", {"name": "Ann"})
-
-
 def test_connected_window_stays_known_among_many(table: Table) -> None:
     window = table.join(PAGES[0])
     for number in range(MAX_PAGES + 5):

@@ -15,7 +15,6 @@ from katana450.arm.control.lease import Role
 from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer
 from tests.gateway.client import HOUR, Control, controlling, enter
-from tests.gateway.lines import Lines
 from tests.gateway.virtual import VirtualServer
 
 SOON = 1.0
@@ -115,12 +114,3 @@ def test_http_questions_take_from_the_same_budget(local: VirtualServer) -> None:
 
 def test_codes_for_phones_are_limited(local: VirtualServer) -> None:
     assert {local.ask("/api/v1/phone")[0] for _ in range(20)} == {200, 429}
-
-
-def test_silent_tcp_connections_do_not_block_programs(server: AppServer) -> None:
-    port = Lines.port(server)
-    with silent(port, 64):
-        lines = Lines(server)
-        with lines.socket, lines.reader:
-            lines.say(do="hello", name="x")
-            assert lines.hear()["is"] == "welcome"

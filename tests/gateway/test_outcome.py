@@ -201,24 +201,6 @@ def test_partly_refused_batch_names_the_refused_parts(session: Session) -> None:
     assert refused.why == "There is no 'ball'. There is no 'cube'."
 
 
-def test_server_names_the_refused_parts_of_a_request(local: VirtualServer) -> None:
-    settings = [
-        {"node": "ball", "field": "translation", "value": [0.3, -0.3, 0.0]},
-        {"node": "axis_1", "field": "rotation", "value": [0.0, 0.0, 1.0, 0.1]},
-    ]
-    with local.speaking() as rows:
-        place = {"shape": "sphere", "size": [0.02], "can_be_held": False}
-        assert rows.answer(do="place", name="ball", **place)["is"] == "done"
-        rows.answer(do="joint", axis=5, value=1.0)
-        # The ball is removed in the same tick, as the arm moves.
-        rows.say(do="remove", name="ball")
-        answer = rows.answer(do="set", **settings[0], more=settings[1:])
-    assert answer["outcome"] == "limited"
-    assert answer["refused"] == [
-        {"part": 2, "command": "move_object", "why": "There is no 'ball'."}
-    ]
-
-
 def test_every_channel_reports_the_outcome(local: VirtualServer) -> None:
     with local.speaking() as rows:
         heard = rows.answer(do="joint", axis=1, value=9.0)

@@ -1,7 +1,4 @@
-"""Access of tests to viser's private parts; no other module in `tests` names them.
-
-docs/viser.md lists each of them.
-"""
+"""Access of tests to viser's private parts, of which they use more than the app."""
 
 from __future__ import annotations
 

@@ -144,20 +144,6 @@ def test_private_parts_of_the_server_are_listed() -> None:
             assert name in names(), f"{path} relies on viser's {name}: list it in {LIST.name}"
 
 
-def test_private_parts_in_tests_are_listed_and_in_one_folder() -> None:
-    folder = Path(__file__).parent
-    views = BRIDGE.parent / "view", BRIDGE.parents[1] / "extensions"
-    ours = {name for _, tree in trees(*views) for name in _defined(tree)}
-    for path, tree in trees(ROOT / "tests", ROOT / "benchmarks", ROOT / "examples", ROOT / "docs"):
-        modules = private_modules(tree)
-        used = private_names(tree) - ours if imports_viser(tree) else set()
-        if path.is_relative_to(folder):
-            for name in modules | used:
-                assert name in names(), f"{path} relies on viser's {name}: list it in {LIST.name}"
-        else:
-            assert not modules | used, f"{path}: use tests.viser_bridge.internals"
-
-
 def test_only_these_scripts_name_private_parts_of_the_page() -> None:
     for path in sorted(STATIC.rglob("*")):
         if path.is_file() and path not in OURS:
@@ -170,17 +156,6 @@ def test_exports_of_these_scripts_are_listed() -> None:
     exports = re.findall(r"^export (?:const|(?:async )?function) (\w+)", text, re.MULTILINE)
     rows = {name for row in listed("Page, as our scripts") for name in row.names}
     assert set(exports) == rows
-
-
-def test_private_parts_in_browser_tests_are_listed() -> None:
-    scripts = [*(ROOT / "tests").rglob("*.js"), *(ROOT / "tests").rglob("*.py")]
-    scripts += (ROOT / "benchmarks").rglob("*.js")
-    known = " ".join(names())
-    for path in scripts:
-        if path == Path(__file__):
-            continue
-        for name in re.findall(r"__viser\w+|\.mantine-[\w-]+", path.read_text(encoding="utf-8")):
-            assert name in known, f"{path} relies on viser's {name}: list it in {LIST.name}"
 
 
 def test_every_part_is_used_where_the_list_says() -> None:
