@@ -264,7 +264,7 @@ class _Sent(NamedTuple):
 
 
 class FlowControl:
-    """How far a browser is behind, and how much more may be sent to it. Times are arguments [s].
+    """The lag of one browser, and how much more may be sent to it. Times are arguments [s].
 
     The page reports the number of frames on its screen. The bytes that were sent and not yet seen
     are limited to the amount that the connection recently carried in time. At the limit no frame is
