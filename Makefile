@@ -149,7 +149,7 @@ bench-kinematics: $(dev_ok)   ## inverse kinematics beside other libraries and b
 bench-kinematics-arms: $(dev_ok) ## the same for arms with six and seven axes
 	$(bin)/python -m benchmarks.kinematics_arms $(ARGS)
 
-# With the extra `gallery`, which is small. The tests use all others but `foxglove`.
+# With the extra `gallery`, which is small. The tests use all others.
 lock: $(dev_ok)               ## resolve the dependencies again into the two lock files
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
 	  --no-header pyproject.toml --group build --extra gallery --output-file requirements.lock

@@ -13,7 +13,6 @@ from katana450.errors import ConfigurationError
 PACKAGES = {
     "datasets": "pyarrow rosbags",
     "films": "imageio-ffmpeg",
-    "foxglove": "foxglove-sdk",
     "gallery": "robot-descriptions",
     "learn": "gymnasium",
     "meshes": "dracopy networkx",

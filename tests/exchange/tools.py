@@ -92,10 +92,7 @@ OPENAPI_VALIDATOR = Package(
 ROSLIBPY = Package("roslibpy==2.1.0", "roslibpy/__init__.py", alone=False)
 """The client of rosbridge for Python; with Twisted, which nothing else needs."""
 
-FOXGLOVE = Package("foxglove-sdk==0.30.3", "foxglove/__init__.py")
-"""The server for Foxglove of the extra `foxglove`, 54 MB."""
-
-WHEELS = (OPENAPI_VALIDATOR, ROSLIBPY, FOXGLOVE)
+WHEELS = (OPENAPI_VALIDATOR, ROSLIBPY)
 """Packages of PyPI."""
 
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")

@@ -125,7 +125,7 @@ EXTENSIONS = (
         (
             CliCommand(
                 "arm",
-                "probe a real arm, or show its log",
+                "probe a real arm: read what can be learned without a motion",
                 f"{HERE}.real_arm.options:add_arm_command_options",
                 f"{HERE}.real_arm.options:arm",
             ),
@@ -155,7 +155,6 @@ EXTENSIONS = (
         "rosbridge",
         serve_options=f"{HERE}.rosbridge.serve_parts:add_serve_options",
         routes=f"{HERE}.rosbridge.serve_parts:routes",
-        process=f"{HERE}.rosbridge.serve_parts:check_installed",
     ),
     Extension(
         "gallery",

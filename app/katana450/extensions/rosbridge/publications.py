@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -93,45 +93,27 @@ def axis_names(robot: Robot) -> tuple[str, ...]:
     return robot.driven if robot.arm is None else robot.arm.chain.names
 
 
-class LinkPose(NamedTuple):
-    """The pose of a link in its parent.
+def transforms(arm: ArmHandle, stamp: Time, *, moving: bool) -> Fields:
+    """Return the poses of the links that joints move, or else of the fixed ones, in their parents.
 
-    Attributes:
-        parent, child: names of the links.
-        translation: x, y and z [m].
-        rotation: unit quaternion x, y, z and w.
+    Translations are in m, rotations unit quaternions.
     """
-
-    parent: str
-    child: str
-    translation: dict[str, float]
-    rotation: dict[str, float]
-
-
-def link_poses(arm: ArmHandle, *, moving: bool) -> Iterator[LinkPose]:
-    """Yield the poses of the links that joints move, or else those of the fixed ones."""
     values = arm.robot.joint_values(arm.state.q, arm.state.gripper)
+    poses: list[Fields] = []
     for link in arm.robot.links:
         if link.parent is None or (link.joint is not None) is not moving:
             continue
         T = link.at_rest(values)
         translation = dict(zip("xyz", T[:3, 3].tolist(), strict=True))
         rotation = dict(zip("wxyz", so3.to_quaternion(T[:3, :3]).tolist(), strict=True))
-        yield LinkPose(link.parent, link.name, translation, rotation)
-
-
-def transforms(arm: ArmHandle, stamp: Time, *, moving: bool) -> Fields:
-    """Return the poses of ``link_poses`` at ``stamp``."""
-    return {
-        "transforms": [
+        poses.append(
             {
-                "header": Header(stamp=stamp, frame_id=pose.parent),
-                "child_frame_id": pose.child,
-                "transform": {"translation": pose.translation, "rotation": pose.rotation},
+                "header": Header(stamp=stamp, frame_id=link.parent),
+                "child_frame_id": link.name,
+                "transform": {"translation": translation, "rotation": rotation},
             }
-            for pose in link_poses(arm, moving=moving)
-        ]
-    }
+        )
+    return {"transforms": poses}
 
 
 def diagnostics(hub: Hub) -> Fields:
