@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Self
 
-from katana450.extensions.real_arm.codec.codecs import FirmwareCodec, RequestReceived
+from katana450.extensions.real_arm.codec.codecs import FirmwareCodec, RequestInvalid
 from katana450.extensions.real_arm.codec.requests import ArmRequest
 
 Piece = bytes | float | None
@@ -52,10 +52,10 @@ class SmallFirmware:
     def _converse(self, connection: socket.socket) -> None:
         codec = FirmwareCodec()
         while data := connection.recv(4096):
-            for event in codec.receive(data):
-                assert isinstance(event, RequestReceived)
-                self.requests.append(event.request)
-                for piece in self._answer(event.request):
+            for request in codec.receive(data):
+                assert not isinstance(request, RequestInvalid)
+                self.requests.append(request)
+                for piece in self._answer(request):
                     if piece is None:
                         connection.setsockopt(
                             socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import pytest
@@ -15,14 +16,9 @@ from katana450.extensions.real_arm.codec.codecs import (
     FirmwareCodec,
     FirmwareEvent,
     HostCodec,
-    HostEvent,
-    OutOfStep,
-    ReplyReceived,
+    OutOfStepError,
     RequestInvalid,
-    RequestReceived,
-    RequestRefused,
     crc16,
-    refusal_bytes,
     reply_bytes,
     request_bytes,
     with_crc,
@@ -41,7 +37,6 @@ SENSORS = replies.SensorBytes(15, tuple(range(16)))
 
 # (request, its bytes, reply, its bytes); None where the source gives none.
 WORKED = [
-    (requests.EchoRequest(), "01 18 01 5A 3B 80", replies.EchoReply(), "7A E3 81"),
     (
         requests.ReadMasterVersion(),
         "01 18 01 42 31 80",
@@ -117,12 +112,6 @@ WORKED = [
     ),
     (requests.ReadSensors(), "01 18 02 45 0F 94 72", SENSORS, None),
     (
-        requests.ReadInputs(),
-        "01 18 05 54 72 00 00 00 B4 2A",
-        replies.DigitalBits(0xFD),
-        "74 FD 81 E6",
-    ),
-    (
         requests.SendSplines((HOLD,) * 6, requests.More.STORE),
         None,
         replies.SplinesSent(),
@@ -130,34 +119,25 @@ WORKED = [
     ),
 ]
 
-# Replies without worked bytes, so that every class is written and read.
-OTHERS = [
-    (requests.ReadCommandTable(), replies.CommandTable(bytes(180))),
-    (
-        requests.ErrorQuery(),
-        replies.FirmwareError(ord("H"), -1, 1, "move buffer error"),
-    ),
+PAIRS: list[tuple[requests.ArmRequest, replies.ArmReply]] = [
+    *((request, reply) for request, _, reply, _ in WORKED),
+    (requests.ErrorQuery(), replies.FirmwareError(ord("H"), -1, 1, "move buffer error")),
 ]
 
-PAIRS = [(request, reply) for request, _, reply, _ in WORKED] + OTHERS
+REFUSAL = reply_bytes(replies.Refused())
 
 
 def test_checksum_has_its_published_check_value() -> None:
     assert crc16(b"123456789") == 0xBB3D
 
 
-@pytest.mark.parametrize(("request_", "sent", "reply", "received"), WORKED)
-def test_worked_bytes_are_written(
-    request_: requests.ArmRequest, sent: str | None, reply: replies.ArmReply, received: str | None
-) -> None:
-    if sent is not None:
-        assert request_bytes(request_) == bytes.fromhex(sent)
-    if received is not None:
-        assert reply_bytes(reply) == bytes.fromhex(received)
-
-
-def test_error_flag_has_its_worked_bytes() -> None:
-    assert refusal_bytes() == bytes.fromhex("C0 50 00")
+def test_worked_bytes_are_written() -> None:
+    assert bytes.fromhex("C0 50 00") == REFUSAL
+    for request, sent, reply, received in WORKED:
+        if sent is not None:
+            assert request_bytes(request) == bytes.fromhex(sent), request
+        if received is not None:
+            assert reply_bytes(reply) == bytes.fromhex(received), reply
 
 
 def test_every_request_and_reply_is_tested() -> None:
@@ -173,9 +153,8 @@ def test_lengths_are_those_of_the_protocol() -> None:
         if not isinstance(request, requests.ErrorQuery)
     }
     assert lengths == {
-        (b"B", 1, 3), (b"Y", 1, 84), (b"X", 1, 181), (b"Z", 1, 1), (b"V", 3, 13), (b"D", 2, 8),
-        (b"N", 3, 13), (b"C", 5, 3), (b"S", 6, 6), (b"A", 3, 2), (b"E", 2, 18),
-        (b"H", 75, 3), (b"T", 5, 2),
+        (b"B", 1, 3), (b"Y", 1, 84), (b"V", 3, 13), (b"D", 2, 8), (b"N", 3, 13),
+        (b"C", 5, 3), (b"S", 6, 6), (b"A", 3, 2), (b"E", 2, 18), (b"H", 75, 3),
     }  # fmt: skip
 
 
@@ -183,13 +162,13 @@ def test_error_is_flagged_then_fetched_by_four_raw_bytes() -> None:
     host, arm = HostCodec(), FirmwareCodec()
     packet = requests.SendSplines((HOLD,) * 6, requests.More.LAST)
     arm.receive(host.send(packet))
-    assert host.receive(refusal_bytes()) == [RequestRefused(packet)]
+    assert host.receive(REFUSAL) == replies.Refused()
     query = host.send(requests.ErrorQuery())
     assert query == bytes.fromhex("00 00 00 C1")
-    assert arm.receive(query) == [RequestReceived(requests.ErrorQuery(), 0)]
+    assert arm.receive(query) == [requests.ErrorQuery()]
     error = replies.FirmwareError(ord("H"), -10, 30, "StopperThread: collision on axis: 1")
     assert len(reply_bytes(error)) == 57
-    assert host.receive(reply_bytes(error)) == [ReplyReceived(requests.ErrorQuery(), error)]
+    assert host.receive(reply_bytes(error)) == error
     assert error.sentence == (
         "The arm refused a request (polynomials): the axis collided "
         "('StopperThread: collision on axis: 1')."
@@ -203,9 +182,8 @@ def test_error_texts_of_all_lengths_are_read(length: int) -> None:
     host = HostCodec()
     host.send(requests.ErrorQuery())
     reply = payload + crc16(payload).to_bytes(2, "big")
-    (event,) = host.receive(reply)
-    assert isinstance(event, ReplyReceived)
-    assert event.reply == replies.FirmwareError(ord("H"), -1, 1, text.rstrip(b"\0").decode())
+    expected = replies.FirmwareError(ord("H"), -1, 1, text.rstrip(b"\0").decode())
+    assert host.receive(reply) == expected
 
 
 @pytest.mark.parametrize(
@@ -238,10 +216,18 @@ def split_at(data: bytes, cuts: list[int]) -> list[bytes]:
     return [data[a:b] for a, b in zip([0, *ends], [*ends, len(data)], strict=True)]
 
 
-def host_events(request: requests.ArmRequest, parts: list[bytes]) -> list[HostEvent]:
+OUT_OF_STEP = "out of step"
+
+
+def received(request: requests.ArmRequest, parts: list[bytes]) -> list[replies.ArmReply | str]:
+    """Return the reply in ``parts``, if it is complete, or OUT_OF_STEP."""
     host = HostCodec()
     host.send(request)
-    return [event for part in parts for event in host.receive(part)]
+    try:
+        answers = [host.receive(part) for part in parts]
+    except OutOfStepError:
+        return [OUT_OF_STEP]
+    return [reply for reply in answers if reply is not None]
 
 
 def firmware_events(parts: list[bytes]) -> list[FirmwareEvent]:
@@ -250,25 +236,14 @@ def firmware_events(parts: list[bytes]) -> list[FirmwareEvent]:
 
 
 @pytest.mark.parametrize(("request_", "reply"), PAIRS)
-def test_reply_is_read_at_every_split(
+def test_request_reply_and_refusal_are_read_at_every_split(
     request_: requests.ArmRequest, reply: replies.ArmReply
 ) -> None:
-    data = reply_bytes(reply)
-    for cut in range(len(data) + 1):
-        parts = [data[:cut], data[cut:]]
-        assert host_events(request_, parts) == [ReplyReceived(request_, reply)]
-    assert host_events(request_, [bytes((byte,)) for byte in data]) == [
-        ReplyReceived(request_, reply)
-    ]
-    assert host_events(request_, [data[:-1]]) == []
-
-
-@pytest.mark.parametrize("request_", [request for request, _ in PAIRS])
-def test_request_and_refusal_are_read_at_every_split(request_: requests.ArmRequest) -> None:
-    address = 0 if isinstance(request_, requests.ErrorQuery) else 24
+    read_reply: Callable[[list[bytes]], Sequence[object]] = partial(received, request_)
     for data, read, event in (
-        (request_bytes(request_), firmware_events, RequestReceived(request_, address)),
-        (refusal_bytes(), partial(host_events, request_), RequestRefused(request_)),
+        (request_bytes(request_), firmware_events, request_),
+        (reply_bytes(reply), read_reply, reply),
+        (REFUSAL, read_reply, replies.Refused()),
     ):
         for cut in range(len(data) + 1):
             assert read([data[:cut], data[cut:]]) == [event]
@@ -279,11 +254,7 @@ def test_request_and_refusal_are_read_at_every_split(request_: requests.ArmReque
 @settings(max_examples=EXAMPLES)
 @given(st.lists(st.integers(0, len(STREAM)), max_size=40))
 def test_requests_are_read_at_every_split(cuts: list[int]) -> None:
-    expected = [
-        RequestReceived(request, 0 if isinstance(request, requests.ErrorQuery) else 24)
-        for request, _ in PAIRS
-    ]
-    assert firmware_events(split_at(STREAM, cuts)) == expected
+    assert firmware_events(split_at(STREAM, cuts)) == [request for request, _ in PAIRS]
 
 
 @settings(max_examples=EXAMPLES)
@@ -292,7 +263,7 @@ def test_garbage_gives_the_same_events_at_every_split(data: bytes, cuts: list[in
     parts = split_at(data, cuts)
     assert firmware_events(parts) == firmware_events([data])
     for request in (requests.ReadPositions(), requests.ErrorQuery()):
-        assert host_events(request, parts) == host_events(request, [data])
+        assert received(request, parts) == received(request, [data])
 
 
 @settings(max_examples=EXAMPLES)
@@ -300,7 +271,7 @@ def test_garbage_gives_the_same_events_at_every_split(data: bytes, cuts: list[in
 def test_requests_after_garbage_without_a_start_are_read(data: bytes) -> None:
     garbage = data.replace(b"\x01", b"\x02").replace(b"\x00", b"\x02")
     events = firmware_events([garbage + request_bytes(requests.ReadStates())])
-    assert events == [RequestReceived(requests.ReadStates(), 24)]
+    assert events == [requests.ReadStates()]
 
 
 @settings(max_examples=EXAMPLES)
@@ -311,16 +282,15 @@ def test_changed_byte_of_a_reply_is_never_taken_for_one(
     request, reply = PAIRS[which]
     data = bytearray(reply_bytes(reply))
     data[place % len(data)] ^= change
-    for event in host_events(request, [bytes(data)]):
-        assert isinstance(event, OutOfStep)
+    assert received(request, [bytes(data)]) in ([], [OUT_OF_STEP])
 
 
 def test_wrong_checksum_of_a_request_is_reported_and_the_next_request_is_read() -> None:
     wrong = bytearray(request_bytes(requests.ReadAxis(3)))
     wrong[-1] ^= 1
-    assert firmware_events([bytes(wrong) + request_bytes(requests.EchoRequest())]) == [
+    assert firmware_events([bytes(wrong) + request_bytes(requests.ReadStates())]) == [
         RequestInvalid(b"D\x03", CRC_ERROR),
-        RequestReceived(requests.EchoRequest(), 24),
+        requests.ReadStates(),
     ]
 
 
@@ -331,34 +301,20 @@ def test_unknown_request_is_reported(payload: bytes) -> None:
     assert firmware_events([frame(payload)]) == [RequestInvalid(payload, INVALID_ARGUMENT)]
 
 
-def test_bytes_without_a_request_put_the_host_out_of_step() -> None:
-    host = HostCodec()
-    (event,) = host.receive(reply_bytes(replies.EchoReply()))
-    assert isinstance(event, OutOfStep)
-    assert host.receive(b"more") == []
-    with pytest.raises(InputError, match="connect again"):
-        host.send(requests.EchoRequest())
+def test_bytes_beside_one_reply_put_the_host_out_of_step() -> None:
+    request, data = requests.ReadMasterVersion(), reply_bytes(replies.MasterVersion(2, 1))
+    with pytest.raises(OutOfStepError, match="no request waits"):
+        HostCodec().receive(data)
+    assert received(request, [data + data]) == received(request, [data, data]) == [OUT_OF_STEP]
 
 
-def test_bytes_after_a_reply_put_the_host_out_of_step() -> None:
-    data = reply_bytes(replies.EchoReply())
-    first, second = host_events(requests.EchoRequest(), [data + data])
-    assert first == ReplyReceived(requests.EchoRequest(), replies.EchoReply())
-    assert isinstance(second, OutOfStep)
-
-
-def test_second_request_before_the_reply_is_refused() -> None:
-    host = HostCodec()
-    host.send(requests.EchoRequest())
-    with pytest.raises(InputError, match="one request at a time"):
-        host.send(requests.EchoRequest())
-
-
-def test_numbers_that_do_not_fit_are_refused_and_leave_the_codec_usable() -> None:
+def test_host_sends_one_request_at_a_time_whose_numbers_fit() -> None:
     host = HostCodec()
     with pytest.raises(InputError, match="does not fit"):
         host.send(requests.CommandMotor(1, 24, 32768))
-    assert host.send(requests.EchoRequest())
+    host.send(requests.ReadStates())
+    with pytest.raises(InputError, match="one request at a time"):
+        host.send(requests.ReadStates())
 
 
 def test_unknown_status_is_said_to_be_unknown() -> None:
@@ -374,7 +330,7 @@ def test_fuzzed_bytes_raise_nothing_and_give_no_wrong_event(count: int) -> None:
     rng = random.Random(count)
     arm = FirmwareCodec()
     # A second source of bytes looks like the protocol, so that the fuzz reaches all of the codec.
-    likely = [reply_bytes(reply) for _, reply in PAIRS] + [STREAM, refusal_bytes(), b"\0\0\0\xc1"]
+    likely = [reply_bytes(reply) for _, reply in PAIRS] + [STREAM, REFUSAL, b"\0\0\0\xc1"]
     done = events = 0
     received_bytes = b""
     while done < count:
@@ -384,15 +340,14 @@ def test_fuzzed_bytes_raise_nothing_and_give_no_wrong_event(count: int) -> None:
         # Longer than any request and what may precede it.
         received_bytes = (received_bytes + data)[-4096:]
         for event in arm.receive(bytes(data)):
-            if isinstance(event, RequestReceived):
+            if isinstance(event, requests.ArmRequest):
                 events += 1
-                sent = request_bytes(event.request, event.address)
-                assert firmware_events([sent]) == [event]
-                assert sent in received_bytes
+                assert firmware_events([request_bytes(event)]) == [event]
+                assert event.payload in received_bytes
         request, _ = rng.choice(PAIRS)
-        for received in host_events(request, [bytes(data)]):
-            if isinstance(received, ReplyReceived):
-                length = len(received.reply.payload)
+        for reply in received(request, [bytes(data)]):
+            if isinstance(reply, replies.ArmReply):
+                length = len(reply.payload)
                 assert with_crc(bytes(data[:length])) == data[: length + 2]
         done += len(data)
     assert events

@@ -13,7 +13,6 @@ import pytest
 
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.extensions.real_arm.codec import requests
-from katana450.extensions.real_arm.codec.codecs import RequestReceived
 from katana450.extensions.real_arm.driver.katana_driver import MAX_SILENCE, KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware
@@ -40,8 +39,8 @@ class Wire:
         handle = Firmware.handle
 
         def handled(firmware: Firmware, event: object) -> bytes:
-            if isinstance(event, RequestReceived):
-                self.requests.append((time.perf_counter(), event.request))
+            if isinstance(event, requests.ArmRequest):
+                self.requests.append((time.perf_counter(), event))
             return handle(firmware, event)  # type: ignore[arg-type]
 
         monkeypatch.setattr(Firmware, "handle", handled)

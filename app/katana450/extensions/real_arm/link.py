@@ -14,13 +14,8 @@ from typing import Protocol, TextIO
 from urllib.parse import urlsplit
 
 from katana450.errors import ConfigurationError, InputError, KatanaError
-from katana450.extensions.real_arm.codec.codecs import (
-    HostCodec,
-    HostEvent,
-    OutOfStep,
-    ReplyReceived,
-)
-from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError
+from katana450.extensions.real_arm.codec.codecs import HostCodec, OutOfStepError
+from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError, Refused
 from katana450.extensions.real_arm.codec.requests import ArmRequest, ErrorQuery
 from katana450.extensions.serial_port import SerialPort
 
@@ -263,21 +258,21 @@ class ArmLink:
                 connection is closed. Whether the arm executed the request is not known.
             InputError: A number does not fit into the request. Nothing was sent.
         """
-        event = self._event_of(request, timeout)
-        if isinstance(event, ReplyReceived):
-            if not request.is_confirmed_by(event.reply):
-                raise ArmRefusalError(FirmwareError(request.HEAD[0], -1, 0, "no axis confirmed"))
-            return event.reply
-        reason = self._event_of(ErrorQuery(), timeout)
-        if isinstance(reason, ReplyReceived) and isinstance(reason.reply, FirmwareError):
-            raise ArmRefusalError(reason.reply)
-        raise ArmRefusalError(FirmwareError(request.HEAD[0], -1, 0, "no reason given"))
+        reply = self._reply_to(request, timeout)
+        if isinstance(reply, Refused):
+            reason = self._reply_to(ErrorQuery(), timeout)
+            if isinstance(reason, FirmwareError):
+                raise ArmRefusalError(reason)
+            raise ArmRefusalError(FirmwareError(request.HEAD[0], -1, 0, "no reason given"))
+        if not request.is_confirmed_by(reply):
+            raise ArmRefusalError(FirmwareError(request.HEAD[0], -1, 0, "no axis confirmed"))
+        return reply
 
     def close(self) -> None:
         """End the connection."""
         self._transport.close()
 
-    def _event_of(self, request: ArmRequest, timeout: float) -> HostEvent:
+    def _reply_to(self, request: ArmRequest, timeout: float) -> ArmReply:
         if self._is_lost:
             raise LinkLostError("The connection to the arm was lost: connect again.")
         data = self._codec.send(request)
@@ -285,18 +280,15 @@ class ArmLink:
         try:
             self._note(SENT, data)
             self._transport.write(data, timeout)
-            while not (events := self._codec.receive(self._read(start + timeout))):
+            while (reply := self._codec.receive(self._read(start + timeout))) is None:
                 pass
-            for event in events:
-                if isinstance(event, OutOfStep):
-                    raise LinkLostError(event.problem)
-        except LinkLostError:
+        except (LinkLostError, OutOfStepError) as error:
             self._is_lost = True
             self.close()
-            raise
+            raise LinkLostError(str(error)) from None
         self.heard_at = start
         self.round_trips.append(self._clock() - start)
-        return events[0]
+        return reply
 
     def _read(self, deadline: float) -> bytes:
         left = deadline - self._clock()

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from katana450.errors import InputError
+from katana450.errors import InputError, KatanaError
 from katana450.extensions.real_arm.codec.replies import (
     CRC_ERROR,
-    ERROR_FLAG,
     INVALID_ARGUMENT,
     ArmReply,
     FirmwareError,
+    Refused,
 )
 from katana450.extensions.real_arm.codec.requests import ArmRequest, ErrorQuery, read_request
 
@@ -49,126 +49,92 @@ ADDRESS = 24
 CRC_BYTES = 2
 
 
-def request_bytes(request: ArmRequest, address: int = ADDRESS) -> bytes:
+def request_bytes(request: ArmRequest) -> bytes:
     """Return ``request`` as it is sent. Raises InputError for numbers that do not fit."""
     payload = request.payload
     if isinstance(request, ErrorQuery):
         return payload
-    return bytes((START, address, len(payload))) + with_crc(payload)
+    return bytes((START, ADDRESS, len(payload))) + with_crc(payload)
 
 
-@dataclass(frozen=True)
-class ReplyReceived:
-    """The reply to ``request`` is complete and its checksum is right."""
-
-    request: ArmRequest
-    reply: ArmReply
-
-
-@dataclass(frozen=True)
-class RequestRefused:
-    """The arm refused ``request``. ``ErrorQuery`` fetches the reason."""
-
-    request: ArmRequest
-
-
-@dataclass(frozen=True)
-class OutOfStep:
-    """The bytes are no answer to the request, so later ones have no meaning: connect again.
-
-    Attributes:
-        problem: Sentence for people.
-    """
-
-    problem: str
-
-
-HostEvent = ReplyReceived | RequestRefused | OutOfStep
+class OutOfStepError(KatanaError):
+    """The bytes are no answer to the request, so later ones have no meaning: connect again."""
 
 
 class HostCodec:
     """Pairs requests with replies on one connection, one at a time.
 
-    After an ``OutOfStep`` the connection cannot be used any more.
+    After an OutOfStepError the connection cannot be used any more.
     """
 
     def __init__(self) -> None:
         self._buffer = bytearray()
         self._request: ArmRequest | None = None
-        self._is_broken = False
 
     def send(self, request: ArmRequest) -> bytes:
         """Return the bytes of ``request``, whose reply is expected next.
 
-        Raises InputError while another request waits, after an ``OutOfStep``, and for numbers that
-        do not fit.
+        Raises InputError while another request waits, and for numbers that do not fit.
         """
-        if self._is_broken:
-            raise InputError("The connection to the arm is out of step: connect again.")
         if self._request is not None:
             raise InputError(f"{self._request} has no answer yet: send one request at a time.")
         data = request_bytes(request)
         self._request = request
         return data
 
-    def receive(self, data: bytes) -> list[HostEvent]:
-        """Return the events that ``data`` completes: none if more bytes are needed."""
-        if self._is_broken:
-            return []
-        self._buffer += data
-        events: list[HostEvent] = []
-        while self._buffer and (event := self._next()) is not None:
-            events.append(event)
-        return events
+    def receive(self, data: bytes) -> ArmReply | None:
+        """Return the reply that ``data`` completes, or None if more bytes are needed.
 
-    def _next(self) -> HostEvent | None:
+        Raises OutOfStepError if the bytes are no reply to the request, or more than one.
+        """
+        self._buffer += data
+        if not self._buffer:
+            return None
+        reply = self._reply()
+        if reply is not None:
+            self._request = None
+            if self._buffer:
+                raise self._out_of_step("more bytes follow the reply")
+        return reply
+
+    def _reply(self) -> ArmReply | None:
         request = self._request
         if request is None:
-            return self._out_of_step("no request waits")
-        if self._buffer[:1] == ERROR_FLAG:
-            return self._complete(request, len(ERROR_FLAG))
+            raise self._out_of_step("no request waits")
+        if self._buffer[:1] == Refused.HEAD:
+            return self._complete(Refused, Refused.length())
         if self._buffer[0] != request.REPLY.HEAD[0]:
-            return self._out_of_step(f"a reply to {type(request).__name__} begins otherwise")
+            raise self._out_of_step(f"a reply to {type(request).__name__} begins otherwise")
         if isinstance(request, ErrorQuery):
-            return self._error(request)
-        return self._complete(request, request.REPLY.length())
+            return self._error()
+        return self._complete(request.REPLY, request.REPLY.length())
 
-    def _error(self, request: ErrorQuery) -> HostEvent | None:
+    def _error(self) -> ArmReply | None:
         """Return the error as soon as a prefix of the bytes is one: its length is not fixed."""
-        longest = FirmwareError.LONGEST + CRC_BYTES
         for length in range(FirmwareError.length() + 1, FirmwareError.LONGEST + 1):
             if len(self._buffer) < length + CRC_BYTES:
                 return None
-            payload = bytes(self._buffer[:length])
-            ends = payload[-1] == 0 or length >= FirmwareError.LONGEST - 1
+            ends = self._buffer[length - 1] == 0 or length >= FirmwareError.LONGEST - 1
             if ends and self._has_crc(length):
-                return self._complete(request, length)
-        return self._out_of_step(f"the checksum of an error of {longest} bytes is wrong", longest)
+                return self._complete(FirmwareError, length)
+        raise self._out_of_step("the checksum of an error is wrong")
 
-    def _complete(self, request: ArmRequest, length: int) -> HostEvent | None:
+    def _complete(self, kind: type[ArmReply], length: int) -> ArmReply | None:
         if len(self._buffer) < length + CRC_BYTES:
             return None
-        payload = bytes(self._buffer[:length])
         if not self._has_crc(length):
-            return self._out_of_step(
-                f"the checksum of a reply to {type(request).__name__} is wrong"
-            )
+            raise self._out_of_step(f"the checksum of {kind.__name__} is wrong")
+        payload = bytes(self._buffer[:length])
         del self._buffer[: length + CRC_BYTES]
-        self._request = None
-        if payload == ERROR_FLAG:
-            return RequestRefused(request)
-        return ReplyReceived(request, request.REPLY.read(payload))
+        return kind.read(payload)
 
     def _has_crc(self, length: int) -> bool:
         crc = int.from_bytes(self._buffer[length : length + CRC_BYTES], "big")
         return crc == crc16(bytes(self._buffer[:length]))
 
-    def _out_of_step(self, problem: str, length: int = 1) -> OutOfStep:
-        shown = bytes(self._buffer[: min(length, 8)]).hex(" ")
-        self._is_broken = True
-        self._request = None
-        self._buffer.clear()
-        return OutOfStep(f"The arm sent bytes that are no answer ({shown} ...): {problem}.")
+    def _out_of_step(self, problem: str) -> OutOfStepError:
+        shown = bytes(self._buffer[:8]).hex(" ")
+        return OutOfStepError(f"The arm sent bytes that are no answer ({shown} ...): {problem}.")
 
 
 HEADER_BYTES = 3
@@ -178,22 +144,6 @@ ERROR_QUERY = ErrorQuery()
 def reply_bytes(reply: ArmReply) -> bytes:
     """Return ``reply`` as it is sent, in one piece."""
     return with_crc(reply.payload)
-
-
-def refusal_bytes() -> bytes:
-    """Return the error flag, which answers a request that is refused."""
-    return with_crc(ERROR_FLAG)
-
-
-@dataclass(frozen=True)
-class RequestReceived:
-    """A complete request with the right checksum, and the address it was sent to.
-
-    ``address`` is 0 for ``ErrorQuery``, which has none.
-    """
-
-    request: ArmRequest
-    address: int
 
 
 @dataclass(frozen=True)
@@ -209,11 +159,14 @@ class RequestInvalid:
     code: int
 
 
-FirmwareEvent = RequestReceived | RequestInvalid
+FirmwareEvent = ArmRequest | RequestInvalid
 
 
 class FirmwareCodec:
-    """Finds requests in the bytes of one connection. Bytes that begin no request are dropped."""
+    """Finds requests in the bytes of one connection. Bytes that begin no request are dropped.
+
+    The address of a request is not checked: one arm is at a connection.
+    """
 
     def __init__(self) -> None:
         self._buffer = bytearray()
@@ -234,7 +187,7 @@ class FirmwareCodec:
                 return self._frame()
             if buffer[: len(query)] == query:
                 del buffer[: len(query)]
-                return RequestReceived(ERROR_QUERY, 0)
+                return ERROR_QUERY
             if len(buffer) < len(query) and query.startswith(buffer):
                 return None
             del buffer[0]
@@ -244,8 +197,7 @@ class FirmwareCodec:
         buffer = self._buffer
         if len(buffer) < HEADER_BYTES:
             return None
-        address, size = buffer[1:HEADER_BYTES]
-        end = HEADER_BYTES + size
+        end = HEADER_BYTES + buffer[HEADER_BYTES - 1]
         if len(buffer) < end + CRC_BYTES:
             return None
         payload = bytes(buffer[HEADER_BYTES:end])
@@ -254,6 +206,6 @@ class FirmwareCodec:
         if crc != crc16(payload):
             return RequestInvalid(payload, CRC_ERROR)
         try:
-            return RequestReceived(read_request(payload), address)
+            return read_request(payload)
         except InputError:
             return RequestInvalid(payload, INVALID_ARGUMENT)

@@ -142,11 +142,8 @@ COMMANDS = {
     "H": "polynomials",
     "N": "states or positions",
     "S": "axis parameter",
-    "T": "digital inputs",
     "V": "slave firmware",
-    "X": "command table",
     "Y": "identity",
-    "Z": "echo",
 }
 
 
@@ -169,9 +166,6 @@ def error_sentence(command: int, code: int, axis: int, text: str) -> str:
 AXES = 6
 """Axes of the protocol: five of the arm, and the gripper."""
 
-ERROR_FLAG = b"\xc0"
-"""Payload that answers any request which the arm refuses; its reason is fetched by ErrorQuery."""
-
 ERROR_TEXT_LENGTH = 51
 """Bytes of the text of an error in the longest form, with its final zero."""
 
@@ -180,10 +174,10 @@ class ArmReply(WireMessage, frozen=True):
     """Base of all replies."""
 
 
-class EchoReply(ArmReply, frozen=True):
-    """Reply without content."""
+class Refused(ArmReply, frozen=True):
+    """Answer to any request that the arm refuses; its reason is fetched by ErrorQuery."""
 
-    HEAD = b"z"
+    HEAD = b"\xc0"
 
 
 class MasterVersion(ArmReply, frozen=True):
@@ -202,17 +196,6 @@ class ArmIdentity(ArmReply, frozen=True):
     LAYOUT = struct.Struct(">81s2s")
     text: bytes
     end: bytes = b"\r\n"
-
-
-class CommandTable(ArmReply, frozen=True):
-    """Commands of the firmware: 30 entries of 6 bytes.
-
-    An entry holds index, command, three bytes of unknown meaning, and the letter of the reply.
-    """
-
-    HEAD = b"x"
-    LAYOUT = struct.Struct(">180s")
-    entries: bytes
 
 
 class SlaveVersion(ArmReply, frozen=True):
@@ -319,14 +302,6 @@ class SplinesSent(ArmReply, frozen=True):
     HEAD = b"h"
     LAYOUT = struct.Struct(">2s")
     results: bytes = b"\x02\x01"
-
-
-class DigitalBits(ArmReply, frozen=True):
-    """Digital inputs: input n is bit n - 1, 0 while it is active."""
-
-    HEAD = b"t"
-    LAYOUT = struct.Struct(">B")
-    bits: int
 
 
 class FirmwareError(ArmReply, frozen=True):

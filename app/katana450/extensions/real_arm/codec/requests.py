@@ -37,13 +37,6 @@ class ArmRequest(WireMessage, frozen=True):
         return getattr(reply, "axis", 1) != 0
 
 
-class EchoRequest(ArmRequest, frozen=True):
-    """Request without effect."""
-
-    HEAD = b"Z"
-    REPLY = replies.EchoReply
-
-
 class ReadMasterVersion(ArmRequest, frozen=True):
     """Read the version of the master's firmware."""
 
@@ -56,13 +49,6 @@ class ReadArmIdentity(ArmRequest, frozen=True):
 
     HEAD = b"Y"
     REPLY = replies.ArmIdentity
-
-
-class ReadCommandTable(ArmRequest, frozen=True):
-    """Read the list of commands of the firmware."""
-
-    HEAD = b"X"
-    REPLY = replies.CommandTable
 
 
 class ReadSlaveVersion(ArmRequest, frozen=True):
@@ -141,20 +127,12 @@ class SetAxisParameter(ArmRequest, frozen=True):
 
 
 class SetCollisionDetection(ArmRequest, frozen=True):
-    """Switch collision detection on (1) or off (0). ``first`` is 1 for on with a Katana300."""
+    """Switch collision detection on (1) or off (0)."""
 
     HEAD = b"A"
-    LAYOUT = struct.Struct(">BB")
+    LAYOUT = struct.Struct(">xB")
     REPLY = replies.CollisionDetectionSet
     enabled: int
-    first: int = 0
-
-    def _numbers(self) -> list[Any]:
-        return [self.first, self.enabled]
-
-    @classmethod
-    def _of(cls, numbers: tuple[Any, ...]) -> Self:
-        return cls(enabled=numbers[1], first=numbers[0])
 
 
 class ReadSensors(ArmRequest, frozen=True):
@@ -231,14 +209,6 @@ class SendSplines(ArmRequest, frozen=True):
         starts = range(0, AXES * width, width)
         segments = tuple(AxisSegment(*numbers[i : i + width]) for i in starts)
         return cls(segments, *numbers[AXES * width :])
-
-
-class ReadInputs(ArmRequest, frozen=True):
-    """Read the digital inputs."""
-
-    HEAD = b"Tr"
-    LAYOUT = struct.Struct(">3x")
-    REPLY = replies.DigitalBits
 
 
 class ErrorQuery(ArmRequest, frozen=True):

@@ -7,7 +7,6 @@ from katana450.extensions.real_arm.codec import requests as req
 from katana450.extensions.real_arm.codec.codecs import (
     FirmwareEvent,
     RequestInvalid,
-    refusal_bytes,
     reply_bytes,
 )
 from katana450.extensions.real_arm.codec.replies import (
@@ -33,14 +32,7 @@ COLLISION_AXIS = 30
 PARAMETERS = 12
 """Number above those of the parameters that are set."""
 
-NO_INPUT = 0xFD
-"""Digital inputs without a signal. With 0xFF, no active input, clients of the maker report a
-failure."""
-
 NO_ERROR = replies.FirmwareError(0, -1, 0, "")
-
-TABLE_ENTRIES = 30
-"""Entries of the table of commands."""
 
 
 class RequestError(Exception):
@@ -69,9 +61,9 @@ class Firmware:
             text = "CRC error" if crc_is_wrong else "unknown command or wrong length"
             return self._refuse(event.payload, RequestError(event.code, 0, text))
         try:
-            return reply_bytes(self.answer(event.request))
+            return reply_bytes(self.answer(event))
         except RequestError as refusal:
-            return self._refuse(event.request.payload, refusal)
+            return self._refuse(event.payload, refusal)
 
     def answer(self, request: req.ArmRequest) -> replies.ArmReply:
         """Execute ``request`` and return its reply. Raises RequestError."""
@@ -91,36 +83,24 @@ class Firmware:
                 return self._command(request)
             case req.SetAxisParameter():
                 return self._parameter(request)
-            case req.SetCollisionDetection(enabled, first):
-                arm.detects_collisions = bool(enabled or first)
+            case req.SetCollisionDetection(enabled):
+                arm.detects_collisions = bool(enabled)
                 return replies.CollisionDetectionSet()
             case req.ReadSensors(controller):
                 return replies.SensorBytes(controller, arm.sensors)
-            case _:
-                return self._facts(request)
-
-    def _facts(self, request: req.ArmRequest) -> replies.ArmReply:
-        """Answer the requests that concern no motion."""
-        match request:
-            case req.EchoRequest():
-                return replies.EchoReply()
             case req.ReadMasterVersion():
                 return replies.MasterVersion(*VERSION)
             case req.ReadArmIdentity():
                 return replies.ArmIdentity(IDENTITY)
-            case req.ReadCommandTable():
-                return replies.CommandTable(_command_table())
             case req.ReadSlaveVersion(axis, parameter):
                 self._axis(axis)
                 return replies.SlaveVersion(axis, parameter, 2, 1, 0, 0, 0)
-            case req.ReadInputs():
-                return replies.DigitalBits(NO_INPUT)
         raise RequestError(INVALID_ARGUMENT, 0, "unknown command")
 
     def _refuse(self, payload: bytes, refusal: RequestError) -> bytes:
         command = payload[0] if payload else 0
         self._error = replies.FirmwareError(command, refusal.code, refusal.axis, refusal.text)
-        return refusal_bytes()
+        return reply_bytes(replies.Refused())
 
     def _axis(self, number: int) -> EmulatedAxis:
         if not 1 <= number <= len(self.arm.axes):
@@ -208,11 +188,3 @@ class Firmware:
         if axis.splines.is_full:
             raise RequestError(SPLINE_FAILED, number, "move buffer error")
         return axis
-
-
-def _command_table() -> bytes:
-    """Return the table of commands. The meaning of its middle bytes is not known."""
-    entries = bytearray()
-    for index, request in enumerate(req.REQUESTS[:TABLE_ENTRIES]):
-        entries += bytes((index, request.HEAD[0], 0, 0, 0, request.REPLY.HEAD[0]))
-    return bytes(entries).ljust(6 * TABLE_ENTRIES, b"\0")
