@@ -14,7 +14,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from katana450.extensions.real_arm.codec.codecs import RequestReceived
 from katana450.extensions.real_arm.codec.replies import AxisStatus, FirmwareError
 from katana450.extensions.real_arm.codec.requests import (
     ArmRequest,
@@ -41,7 +40,7 @@ class FaultyServer(EmulatorServer):
 
     def __init__(self, arm: EmulatedArm, reply_delay: Callable[[], float] = lambda: 0.0) -> None:
         """Serve ``arm``. ``reply_delay`` returns the time by which the next reply is late [s]."""
-        super().__init__(arm, "127.0.0.1", 0)
+        super().__init__(arm)
         self._reply_delay = reply_delay
         self._dropping = threading.Event()
 
@@ -86,7 +85,7 @@ class Bench:
 
     def refused(self, request: ArmRequest) -> FirmwareError:
         """Return the error for which ``request`` is refused."""
-        self.firmware.handle(RequestReceived(request, 24))
+        self.firmware.handle(request)
         error = self.firmware.answer(ErrorQuery())
         assert isinstance(error, FirmwareError)
         assert error.command == request.payload[0], "the request was not refused"
@@ -145,16 +144,6 @@ def at_rest(arm: EmulatedArm) -> bool:
 
 
 @contextmanager
-def emulator(*options: str) -> Iterator[int]:
-    """Run ``katana450 emulate`` and return its port."""
-    with emulator_process(*options) as (process, port):
-        yield port
-        process.terminate()
-        output, _ = process.communicate(timeout=TIMEOUT)
-        assert process.returncode == 0, output
-
-
-@contextmanager
 def emulator_process(*options: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """Run ``katana450 emulate``; return its process, which may be frozen or ended, and port."""
     process = subprocess.Popen(
@@ -183,20 +172,6 @@ def linked(port: int) -> Iterator[ArmLink]:
         yield link
     finally:
         link.close()
-
-
-@contextmanager
-def raw(port: int) -> Iterator[socket.socket]:
-    """Connect to an arm behind a port, byte for byte."""
-    with socket.create_connection(("127.0.0.1", port), TIMEOUT) as client:
-        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        yield client
-
-
-def exchanged(client: socket.socket, text: str) -> str:
-    """Send bytes and return what one read finds, both as hexadecimals."""
-    client.sendall(bytes.fromhex(text))
-    return client.recv(4096).hex(" ").upper()
 
 
 HOLDS = {AxisStatus.FIXED, AxisStatus.SPLINES_DONE}

@@ -249,11 +249,6 @@ def test_gripper_closes_on_an_object_and_its_sensors_feel_it(width: float) -> No
     assert [bench.arm.sensors[number] for number in (6, 7, 14, 15)] == [free[6]] * 4
 
 
-@pytest.mark.parametrize(("gap", "encoder"), [(0.4, 12240), (43.0, 18250), (120.4, 30770)])
-def test_encoder_follows_the_gap_of_the_fingers(gap: float, encoder: float) -> None:
-    assert encoder_at_gap(gap) == pytest.approx(encoder, abs=1.0)
-
-
 def test_arm_falls_when_its_motors_are_switched_off(bench: Bench) -> None:
     bench.ask(req.SetAxisParameter(2, 3, 180, 180))
     bench.move(2, -10000)

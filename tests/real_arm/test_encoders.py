@@ -45,13 +45,6 @@ def test_maximum_speeds_are_those_of_the_robot_description(arm: ArmModel) -> Non
     assert speeds[5] == pytest.approx(arm.gripper.speed, rel=1e-3)
 
 
-@pytest.mark.parametrize(("encoder", "finger"), [(30770, 0.30), (12240, -0.44)])
-def test_gripper_opens_and_closes_at_its_known_encoders(encoder: int, finger: float) -> None:
-    encoders = CALIBRATED.copy()
-    encoders[5] = encoder
-    assert MAP.joints(encoders)[5] == pytest.approx(finger, abs=1e-4)
-
-
 def test_finger_follows_the_formula_of_the_motor() -> None:
     for encoder in (12240, 20000, 30770):
         degrees = -119.5 - (encoder - 31000) * 360.0 / 51200

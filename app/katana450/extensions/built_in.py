@@ -127,7 +127,7 @@ EXTENSIONS = (
                 "arm",
                 "probe a real arm: read what can be learned without a motion",
                 f"{HERE}.real_arm.options:add_arm_command_options",
-                f"{HERE}.real_arm.options:arm",
+                f"{HERE}.real_arm.probe:probe",
             ),
             CliCommand(
                 "emulate",

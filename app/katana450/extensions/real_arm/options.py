@@ -7,21 +7,18 @@ from __future__ import annotations
 
 import argparse
 from argparse import Namespace
-from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
+from katana450.cli.option_values import number, port
 from katana450.errors import ConfigurationError
-from katana450.extensions.real_arm.plant.axis import KATANA450, PROFILES
+from katana450.extensions.real_arm.plant.axis import PROFILES
 
 if TYPE_CHECKING:
     from katana450.arm.drivers.driver import Driver
     from katana450.arm.robot.robot import Robot
     from katana450.maths.geometry.arrays import FloatArray
     from katana450.sdk import ViewLayer
-
-N = TypeVar("N", int, float)
 
 PORT = 5566
 """TCP port of an arm."""
@@ -32,8 +29,6 @@ STOP_BUTTON = (
 )
 
 ADDRESS_HELP = "address of the arm: tcp://HOST, tcp://HOST:PORT or serial:///dev/ttyUSB0"
-
-MAX_REPEATS = 10_000
 
 WIDEST_OBJECT = 120.0
 """[mm] Gap of the open gripper."""
@@ -46,19 +41,11 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
         "as an arm after power-up: not calibrated, with its motors off."
     )
     parser.add_argument(
-        "--port",
-        type=_between("a port", int, 0, 65535),
-        default=PORT,
-        help="0 for any free port (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--host",
-        default="127.0.0.1",
-        help="address of this machine on which it listens (default: %(default)s)",
+        "--port", type=port, default=PORT, help="0 for any free port (default: %(default)s)"
     )
     parser.add_argument(
         "--object",
-        type=_between("a width in mm", float, 1.0, WIDEST_OBJECT),
+        type=number(1.0, WIDEST_OBJECT, "mm"),
         metavar="MM",
         help="width of an object between the fingers",
     )
@@ -67,44 +54,26 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--calibration-scale",
-        type=_between("a factor", float, 1.0, 100.0),
+        type=number(1.0, 100.0),
         default=1.0,
         metavar="N",
         help="calibrate N times as fast, for tests (default: %(default)g)",
     )
-    parser.add_argument(
-        "--plant",
-        choices=sorted(PROFILES),
-        default=KATANA450.name,
-        help="how the motors follow (default: %(default)s)",
-    )
 
 
 def add_arm_command_options(parser: argparse.ArgumentParser) -> None:
-    """Add the subcommands probe and log of ``katana450 arm`` to ``parser``."""
+    """Add the subcommand probe of ``katana450 arm`` to ``parser``."""
     parser.description = STOP_BUTTON
-    acts = parser.add_subparsers(dest="act", required=True, metavar="probe | log")
+    acts = parser.add_subparsers(dest="act", required=True, metavar="probe")
     probe = acts.add_parser(
         "probe",
         help="ask an arm all that can be learned without a motion, and write a report",
         description=f"Only reads: nothing moves. {STOP_BUTTON}",
     )
     probe.add_argument(
-        "--repeat",
-        type=_between("a number", int, 1, MAX_REPEATS),
-        default=50,
-        help="number of times that each reading is repeated for its reply time (default: "
-        "%(default)s)",
-    )
-    probe.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE",
-        help="report as JSON; the same in words is written beside it (default: named by the time)",
+        "--out", type=Path, metavar="FILE", help="report as JSON (default: named by the time)"
     )
     probe.add_argument("url", metavar="URL", help=ADDRESS_HELP)
-    log = acts.add_parser("log", help="show the exchanges that `serve --arm-log FILE` has written")
-    log.add_argument("file", type=Path, metavar="FILE", help="file of the exchanges")
 
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
@@ -125,30 +94,6 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--arm-log", type=Path, metavar="FILE", help="write all exchanges with the real arm there"
     )
-
-
-def _between(what: str, read: Callable[[str], N], lower: N, upper: N) -> Callable[[str], N]:
-    """Return the reader of an option: ``what``, a number from ``lower`` to ``upper``."""
-
-    def checked(text: str) -> N:
-        with suppress(ValueError):
-            value = read(text)
-            if lower <= value <= upper:
-                return value
-        raise argparse.ArgumentTypeError(f"{what} from {lower:g} to {upper:g}, not {text!r}")
-
-    return checked
-
-
-def arm(options: Namespace) -> int:
-    """Execute ``katana450 arm``; return the exit status."""
-    if options.act == "probe":
-        from katana450.extensions.real_arm.probe import probe
-
-        return probe(options)
-    from katana450.extensions.real_arm.exchange_lines import show_log
-
-    return show_log(options)
 
 
 def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> Driver | None:

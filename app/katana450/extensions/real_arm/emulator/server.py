@@ -15,9 +15,10 @@ from katana450.assembly.log_output import say
 from katana450.extensions.real_arm.codec.codecs import FirmwareCodec
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm, loads_of_robot
 from katana450.extensions.real_arm.emulator.firmware import Firmware
-from katana450.extensions.real_arm.plant.axis import PROFILES
 from katana450.platform_support import raise_priority, stop_signals
 from katana450.sdk import listen
+
+HOST = "127.0.0.1"
 
 IDLE = 0.01
 """[s] Interval at which the arm moves while nothing is received."""
@@ -46,15 +47,12 @@ class EmulatorServer:
         port: port on which it listens.
     """
 
-    def __init__(self, arm: EmulatedArm, host: str, port: int) -> None:
-        """Open a port for ``arm``. Raises ConfigurationError if it is taken.
-
-        ``host``: address of this machine. ``port``: 0 for any free one.
-        """
+    def __init__(self, arm: EmulatedArm, port: int = 0) -> None:
+        """Open ``port``, 0 for any free one, for ``arm``. Raises ConfigurationError if taken."""
         self.arm = arm
         self.lock = threading.Lock()
         self._firmware = Firmware(arm)
-        self._listening = listen(host, port)
+        self._listening = listen(HOST, port)
         self._listening.setblocking(False)
         self.port: int = self._listening.getsockname()[1]
         self._client: socket.socket | None = None
@@ -152,16 +150,15 @@ def emulate(options: Namespace) -> int:
     for number in stop_signals():
         signal.signal(number, lambda *_: ending.set())
     arm = EmulatedArm(
-        PROFILES[options.plant],
-        loads_of_robot(load()),
+        loads=loads_of_robot(load()),
         calibrated=options.calibrated,
         calibration_scale=options.calibration_scale,
         object_width=options.object,
     )
     raise_priority()
-    emulator = EmulatorServer(arm, options.host, options.port)
+    emulator = EmulatorServer(arm, options.port)
     emulator.start()
-    say(f"Emulated arm: tcp://{options.host}:{emulator.port} (Ctrl-C stops)")
+    say(f"Emulated arm: tcp://{HOST}:{emulator.port} (Ctrl-C stops)")
     try:
         while not ending.wait(CHECK_INTERVAL) and emulator.is_running:
             pass
