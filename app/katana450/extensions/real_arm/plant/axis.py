@@ -115,26 +115,6 @@ class PlantAxis:
         contact: angle below which something soft is squeezed [unit], or minus infinity.
     """
 
-    __slots__ = (
-        "_coulomb",
-        "_damping",
-        "_droop",
-        "_fall",
-        "_max_acceleration",
-        "_max_speed",
-        "_play",
-        "_softness",
-        "_spring",
-        "_viscous",
-        "contact",
-        "effort",
-        "lower",
-        "output",
-        "position",
-        "speed",
-        "upper",
-    )
-
     def __init__(
         self,
         profile: PlantProfile,
