@@ -1,4 +1,4 @@
-"""Calibration files, layouts, and the posture of the arm that a posture of the leader means."""
+"""Calibration files, and the posture of the arm that a posture of the leader means."""
 
 from __future__ import annotations
 
@@ -12,12 +12,9 @@ import pytest
 
 from katana450.errors import InputError
 from katana450.extensions.leader.joint_map import (
-    SO101,
     JointMap,
-    Layout,
     decoded_calibration,
     read_calibration,
-    read_layout,
 )
 from katana450.extensions.leader.leader_command import prepare
 from katana450.extensions.leader.motor_bus import (
@@ -70,7 +67,7 @@ def ticks(*degrees: float) -> dict[int, int]:
 
 
 def test_directions_of_the_links_are_those_of_the_leader() -> None:
-    joints = JointMap(decoded_calibration(calibrated()), SO101, arm())
+    joints = JointMap(decoded_calibration(calibrated()), arm())
     posture = joints.posture(ticks(0, 0, 0, 0, 0, 0))
     assert joints.motors == (1, 2, 3, 4, 5, 6)
     # In the middle of all ranges the upper arm rises steeply, forearm and hand are level.
@@ -86,7 +83,7 @@ def test_directions_of_the_links_are_those_of_the_leader() -> None:
 
 
 def test_posture_stays_within_the_limits_of_the_arm() -> None:
-    joints = JointMap(decoded_calibration(calibrated()), SO101, arm())
+    joints = JointMap(decoded_calibration(calibrated()), arm())
     for way in (-1, 1):
         posture = joints.posture(ticks(*[way * 200.0] * 6))
         assert (posture.q > LOWER).all()
@@ -102,7 +99,7 @@ def test_drive_mode_reverses_a_joint() -> None:
 
 
 def test_arm_without_gripper_needs_no_jaw() -> None:
-    joints = JointMap(decoded_calibration(calibrated()), SO101, arm(gripper=False))
+    joints = JointMap(decoded_calibration(calibrated()), arm(gripper=False))
     assert joints.motors == (1, 2, 3, 4, 5)
     assert joints.posture(ticks(0, 0, 0, 0, 0)).finger is None
 
@@ -135,31 +132,13 @@ def test_missing_file_and_missing_motor_are_named(tmp_path: Path) -> None:
     known = decoded_calibration(calibrated())
     del known["wrist_flex"]
     with pytest.raises(InputError, match="no motor wrist_flex, but shoulder_pan"):
-        JointMap(known, SO101, arm())
+        JointMap(known, arm())
 
 
-def test_layout_of_another_leader(tmp_path: Path) -> None:
-    file = tmp_path / "layout.yaml"
-    sources = [f"  - {{motor: m{i}, sign: -1, offset: {i}}}" for i in range(5)]
-    file.write_text("\n".join(["axes:", *sources, "gripper: {motor: m5, reversed: true}"]))
-    layout = read_layout(file)
-    known = {f"m{i}": motor for i, motor in enumerate(decoded_calibration(calibrated()).values())}
-    posture = JointMap(known, layout, arm()).posture(ticks(10, 0, 0, 0, 0, 118))
-    assert np.degrees(posture.raw) == pytest.approx([-10, 1, 2, 3, 4], abs=0.1)
-    assert posture.finger == pytest.approx(-0.4, abs=0.01)
-    for text, message in (("axes: [{motor: a, sign: 2}]", "sign"), ("axes: {", "not the layout")):
-        file.write_text(text)
-        with pytest.raises(InputError, match=message):
-            read_layout(file)
-    with pytest.raises(InputError, match="names 1 that turn"):
-        JointMap(known, msgspec.structs.replace(layout, axes=layout.axes[:1]), arm())
-    assert isinstance(layout, Layout)
-
-
-def test_layout_with_a_motor_twice_is_refused() -> None:
-    twice = msgspec.structs.replace(SO101, axes=(*SO101.axes[:4], SO101.axes[0]))
-    with pytest.raises(InputError, match="names a motor twice"):
-        JointMap(decoded_calibration(calibrated()), twice, arm())
+def test_arm_with_other_joints_is_refused() -> None:
+    six = msgspec.structs.replace(arm(), lower=[*LOWER, -1.0])
+    with pytest.raises(InputError, match=r"has 6 joints, 0 of which slide\. The leader has 5"):
+        JointMap(decoded_calibration(calibrated()), six)
 
 
 class WiredPort:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, connect
-from katana450.extensions.leader.joint_map import SO101, JointMap, decoded_calibration
+from katana450.extensions.leader.joint_map import JointMap, decoded_calibration
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 from tests.waiting import until
@@ -85,7 +85,7 @@ def at_terminal(command: list[str]) -> Iterator[Terminal]:
 def posture(watcher: Client, tmp_path: Path, angles: tuple[float, ...]) -> np.ndarray:
     """Return the posture of the arm at ``angles`` of the motors."""
     calibration = decoded_calibration((tmp_path / "leader.json").read_bytes())
-    joints = JointMap(calibration, SO101, watcher.query(answers.Arm))
+    joints = JointMap(calibration, watcher.query(answers.Arm))
     motors = EmulatedMotors()
     motors.angles = angles
     ticks = {motor: motors.position(motor) for motor in joints.motors}

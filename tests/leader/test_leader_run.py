@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from katana450.extensions.leader.joint_map import SO101, JointMap, decoded_calibration
+from katana450.extensions.leader.joint_map import JointMap, decoded_calibration
 from katana450.extensions.leader.leader_command import LeaderRun
 from katana450.extensions.leader.motor_bus import MotorBus
 from katana450.server.api import answers, requests
@@ -61,7 +61,7 @@ def test_enter_before_the_server_has_taken_the_program_ends_and_begins_again() -
     server, fingers = StalledServer(), Fingers()
     client: Any = server
     keyboard: Any = fingers
-    joints = JointMap(decoded_calibration(calibrated()), SO101, arm())
+    joints = JointMap(decoded_calibration(calibrated()), arm())
 
     async def until(count: int) -> None:
         async with asyncio.timeout(5.0):

@@ -2,9 +2,7 @@
 
 The arm first moves to the leader's posture on a planned path. It follows only once both are near
 each other. Everything unexpected ends this: the samples end, the arm comes to rest by itself, and
-nothing moves again before a person asks for it. The page has the same machine in
-static/leader/follower.js, which is compared with this one in tests/browser. Times are in s,
-angles in rad.
+nothing moves again before a person asks for it. Times are in s, angles in rad.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ from enum import Enum
 
 import numpy as np
 
-from katana450.client.asynchronous import is_over
+from katana450.client.client import is_over
 from katana450.extensions.leader.joint_map import LeaderPosture
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.sdk import answers

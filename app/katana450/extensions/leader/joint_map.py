@@ -1,4 +1,4 @@
-"""Positions of the leader's motors as a posture of the arm, by calibration and layout."""
+"""Positions of the leader's motors as a posture of the arm, by their calibration."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, NamedTuple
 
 import msgspec
 import numpy as np
-import yaml
 from msgspec import Meta
 
 from katana450.errors import InputError
@@ -19,7 +18,7 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.sdk import answers
 
 MAX_BYTES = 64_000
-"""Maximum size of a file that describes a leader."""
+"""Maximum size of a calibration file."""
 
 Ticks = Annotated[int, Meta(ge=-TURN, le=2 * TURN)]
 
@@ -90,74 +89,33 @@ def decoded_calibration(data: bytes) -> Calibration:
     return calibration
 
 
-class AxisSource(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class AxisSource(NamedTuple):
     """The joint of the leader that one joint of the arm follows.
 
     Attributes:
         motor: name of the motor in the calibration file.
-        sign: whether both turn in the same direction.
+        sign: 1 if both turn in the same direction, -1 otherwise.
         offset: angle of the arm's joint in the middle of the motor's range [deg].
     """
 
     motor: str
-    sign: Literal[1, -1] = 1
-    offset: Annotated[float, Meta(ge=-360.0, le=360.0)] = 0.0
+    sign: int
+    offset: float = 0.0
 
 
-class FingerSource(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The joint of the leader that the fingers follow.
-
-    Attributes:
-        motor: name of the motor in the calibration file.
-        reversed: whether the fingers are open at the lower end of its range.
-    """
-
-    motor: str
-    reversed: bool = False
-
-
-class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The joints of a leader.
-
-    Attributes:
-        axes: one for each joint of the arm.
-        gripper: that of the fingers; None for a leader without one.
-    """
-
-    axes: Annotated[tuple[AxisSource, ...], Meta(min_length=1)]
-    gripper: FingerSource | None = None
-
-
-SO101 = Layout(
-    (
-        # The leader's pan turns about its axis downwards, the arm's about its axis upwards.
-        AxisSource("shoulder_pan", -1),
-        AxisSource("shoulder_lift", 1, -76.0),
-        AxisSource("elbow_flex", 1, 73.8),
-        AxisSource("wrist_flex", 1, 2.2),
-        # The leader's roll turns about its axis backwards, the arm's about its axis forwards.
-        AxisSource("wrist_roll", -1),
-    ),
-    FingerSource("gripper"),
+AXES = (
+    # The leader's pan turns about its axis downwards, the arm's about its axis upwards.
+    AxisSource("shoulder_pan", -1),
+    AxisSource("shoulder_lift", 1, -76.0),
+    AxisSource("elbow_flex", 1, 73.8),
+    AxisSource("wrist_flex", 1, 2.2),
+    # The leader's roll turns about its axis backwards, the arm's about its axis forwards.
+    AxisSource("wrist_roll", -1),
 )
-"""The SO-101 leader. The page has the same numbers in static/leader/follower.js."""
+"""The joints of the SO-101 leader."""
 
-
-def read_layout(path: Path) -> Layout:
-    """Return the layout in the YAML file ``path``. Raises InputError with what is wrong in it."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise InputError(f"{path} has more than {MAX_BYTES} bytes.")
-        return msgspec.convert(yaml.safe_load(data), Layout)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from error
-    except (msgspec.MsgspecError, yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"{path} is not the layout of a leader: {error}. docs/leader.md has an example."
-        ) from error
-
+GRIPPER = "gripper"
+"""Name of the motor of its jaw."""
 
 LIMIT_MARGIN = 1e-4
 """[rad] Distance that is kept from the limits of the joints, so that no rounding exceeds them."""
@@ -186,27 +144,23 @@ class JointMap:
         finger_range: finger joint closed and open; None without one on both sides.
     """
 
-    def __init__(self, calibration: Calibration, layout: Layout, arm: answers.Arm) -> None:
-        """Take the joints of ``layout`` for those of ``arm``, in their order.
+    def __init__(self, calibration: Calibration, arm: answers.Arm) -> None:
+        """Take the joints of the leader for those of ``arm``, in their order.
 
         Raises InputError if a motor is not calibrated or the joints do not correspond.
         """
-        if len(layout.axes) != len(arm.lower) or any(arm.slides):
+        if len(AXES) != len(arm.lower) or any(arm.slides):
             raise InputError(
                 f"{arm.name} has {len(arm.lower)} joints, {sum(arm.slides)} of which slide. The "
-                f"layout of the leader names {len(layout.axes)} that turn. Give another one by "
-                "--layout."
+                f"leader has {len(AXES)} that turn, so it cannot drive this arm."
             )
-        self._axes = [(_of(calibration, axis), axis) for axis in layout.axes]
-        self._finger: tuple[MotorCalibration, FingerSource] | None = None
+        self._axes = [(_of(calibration, axis.motor), axis) for axis in AXES]
+        self._finger: MotorCalibration | None = None
         self.finger_range: tuple[float, float] | None = None
-        if layout.gripper is not None and arm.gripper is not None:
-            self._finger = _of(calibration, layout.gripper), layout.gripper
-            self.finger_range = arm.gripper[:2]
+        if arm.gripper is not None:
+            self._finger, self.finger_range = _of(calibration, GRIPPER), arm.gripper[:2]
         motors = [motor.id for motor, _ in self._axes]
-        self.motors = tuple(motors if self._finger is None else [*motors, self._finger[0].id])
-        if len(set(self.motors)) < len(self.motors):
-            raise InputError("The layout of the leader names a motor twice. Each moves one joint.")
+        self.motors = tuple(motors if self._finger is None else [*motors, self._finger.id])
         self._lower = np.array(arm.lower) + LIMIT_MARGIN
         self._upper = np.array(arm.upper) - LIMIT_MARGIN
 
@@ -223,19 +177,15 @@ class JointMap:
         q = frozen(np.clip(raw, self._lower, self._upper))
         if self._finger is None or self.finger_range is None:
             return LeaderPosture(raw, q, None)
-        motor, source = self._finger
-        fraction = motor.fraction(ticks[motor.id])
         closed, opened = self.finger_range
-        fraction = 1.0 - fraction if source.reversed else fraction
+        fraction = self._finger.fraction(ticks[self._finger.id])
         return LeaderPosture(raw, q, closed + fraction * (opened - closed))
 
 
-def _of(calibration: Calibration, source: AxisSource | FingerSource) -> MotorCalibration:
-    try:
-        return calibration[source.motor]
-    except KeyError as error:
+def _of(calibration: Calibration, name: str) -> MotorCalibration:
+    if name not in calibration:
         raise InputError(
-            f"The calibration file has no motor {source.motor}, but "
-            f"{', '.join(calibration) or 'none'}. Choose the file of this leader, or give its "
-            "joints by --layout."
-        ) from error
+            f"The calibration file has no motor {name}, but {', '.join(calibration) or 'none'}. "
+            "Choose the file of this leader."
+        )
+    return calibration[name]

@@ -12,7 +12,7 @@ from argparse import Namespace
 from contextlib import suppress
 
 from katana450.assembly.log_output import printable
-from katana450.client.asynchronous import AsyncClient, aconnect
+from katana450.client.client import AsyncClient, aconnect
 from katana450.client.files import LostError, RefusedError
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.leader.follower import (
@@ -27,12 +27,10 @@ from katana450.extensions.leader.follower import (
     Say,
 )
 from katana450.extensions.leader.joint_map import (
-    SO101,
     Calibration,
     JointMap,
     LeaderPosture,
     read_calibration,
-    read_layout,
 )
 from katana450.extensions.leader.motor_bus import (
     BAUD,
@@ -93,14 +91,13 @@ HELP = "Enter begins and ends following, Ctrl-C ends the program."
 def lead(options: Namespace) -> int:
     """Run ``katana450 leader`` and return the exit status. Raises KatanaError."""
     calibration = read_calibration(options.calibration)
-    layout = SO101 if options.layout is None else read_layout(options.layout)
     port = SerialPort(options.port, BAUD, "the leader", UnpluggedError)
     try:
         bus = MotorBus(port)
 
         async def drive() -> int:
             async with aconnect(options.url, NAME, options.token) as client:
-                joints = JointMap(calibration, layout, await client.query(answers.Arm))
+                joints = JointMap(calibration, await client.query(answers.Arm))
                 prepare(bus, calibration, joints.motors)
                 return await LeaderRun(client, bus, joints, Keyboard()).run()
 

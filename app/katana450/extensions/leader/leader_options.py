@@ -9,7 +9,7 @@ from katana450.cli.option_values import add_server_options
 
 
 def add_leader_options(parser: argparse.ArgumentParser) -> None:
-    """Add port, calibration, layout, and the address and token of the server, to ``parser``."""
+    """Add port, calibration, and the address and token of the server, to ``parser``."""
     parser.add_argument("port", help="serial port of the leader, such as /dev/ttyUSB0 or COM3")
     parser.add_argument(
         "--calibration",
@@ -17,11 +17,5 @@ def add_leader_options(parser: argparse.ArgumentParser) -> None:
         required=True,
         metavar="FILE",
         help="calibration of the leader, a JSON file of LeRobot",
-    )
-    parser.add_argument(
-        "--layout",
-        type=Path,
-        metavar="FILE",
-        help="YAML file with the joints of another leader than the SO-101",
     )
     add_server_options(parser)
