@@ -46,7 +46,7 @@ number or a text of your own; its answer has the same `id`. Without an `id` only
 | **HTTP** `POST /api/v{version}/scripts`, `scripts/NAME` | The problems of the text in the body, line by line, and its poses if it has only [these](programs.md#teaching); saves a valid text in the folder. |
 | **HTTP** `POST /api/v{version}/stop?press=NAME` | `stop`, on the main port and on the [port of STOP](access.md#the-port-of-stop), which answers with the stage. `press` makes copies on both count once. |
 | **HTTP** `GET`, `POST /api/v{version}/episodes`, `GET episodes/NUMBER` | The list of [episodes](recording.md#episodes); starts, ends and judges them; the file of one. |
-| **HTTP** `GET /api/v{version}/openapi.json` | Description of this API for programs: OpenAPI 3.1. It describes each message with its units, including those of extensions; the messages on the websocket and the TCP port are the same. |
+| **HTTP** `GET /api/v{version}/openapi.json` | Description of this API for programs: OpenAPI 3.1. It describes `do`, `stop`, the answers of `query` and each message with its units, including those of extensions; the messages on the websocket and the TCP port are the same. |
 
 Every request is a heartbeat. If the server requires an access link ([access](access.md)), send the
 token behind its `#` as `Authorization: Bearer TOKEN` or in the `hello`. The server stops a moving arm

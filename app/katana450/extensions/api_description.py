@@ -1,12 +1,14 @@
-"""Description of the API for programs: an OpenAPI 3.1 document, from the message classes."""
+"""Description of the API for programs: an OpenAPI 3.1 document, from the message classes.
+
+It describes requests and answers; docs/api.md has the paths of files and lists.
+"""
 
 from __future__ import annotations
 
 import functools
 import inspect
 import re
-from collections.abc import Mapping
-from typing import Any, NamedTuple, Union
+from typing import Any, Union
 
 import msgspec
 from starlette.requests import Request as HttpRequest
@@ -100,140 +102,12 @@ def _divided(doc: str) -> tuple[str, dict[str, str]]:
     return text.rstrip(), {name: " ".join(about.split()) for name, about in entries}
 
 
-class Operation(NamedTuple):
-    """One method of a path.
+JSON = "application/json"
 
-    Attributes:
-        method, path: ``get`` or ``post``, and the path below ``/api/v1``.
-        name: its name in generated clients.
-        about: one line of text.
-        answer: class of the answer, or media type of the content; None for no content.
-        body: media type of the content that is sent; None for none.
-        query: names of its parameters in the query, of ``PARAMETERS``.
-    """
-
-    method: str
-    path: str
-    name: str
-    about: str
-    answer: type | str | None
-    body: str | None = None
-    query: tuple[str, ...] = ()
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """The operation of OpenAPI."""
-        described = _operation(self.name, self.about, self.answer)
-        placed = re.findall(r"{(\w+)}", self.path)
-        parameters = [
-            *(_parameter(name, "path", PARAMETERS[name]) for name in placed),
-            *(_parameter(name, "query", PARAMETERS[name]) for name in self.query),
-        ]
-        if parameters:
-            described["parameters"] = parameters
-        if self.body is not None:
-            described["requestBody"] = _content(self.body, CONTENTS[self.body])
-        return described
-
-
-TEXT, OBJECT = {"type": "string"}, {"type": "object"}
-
-JSON, BINARY, ZIP = "application/json", "application/octet-stream", "application/zip"
-
-CONTENTS: Mapping[str, dict[str, Any]] = {
-    JSON: OBJECT,
-    BINARY: TEXT | {"format": "binary"},
-    ZIP: TEXT | {"format": "binary"},
-    "text/plain": TEXT,
-    "application/yaml": TEXT,
-    "application/schema+json": OBJECT,
-}
-"""Schema of each media type."""
-
-PARAMETERS: Mapping[str, dict[str, Any]] = {
-    "format": TEXT
-    | {
-        "description": "wrl, stl, obj, ply, glb, gltf, 3mf or zip, for a name without an "
-        "ending. A zip holds one such file and the files that it names."
-    },
-    "from": {"type": "number", "description": "Begin [s since the epoch]."},
-    "last": {"type": "number", "description": "Time before the present [s]."},
-    "main": TEXT | {"description": "Path in a zip of the file to read, if there are several."},
-    "name": TEXT | {"description": "Name, of a file with its ending."},
-    "number": {"type": "integer", "description": "Number of the episode."},
-    "press": TEXT
-    | {
-        "maxLength": MAX_PRESS_LENGTH,
-        "description": "Name of this press. The same name again does not count again.",
-    },
-    "to": {"type": "number", "description": "End [s since the epoch]."},
-    "unit": TEXT | {"description": "mm, cm, in or m. Without it the unit is guessed and reported."},
-}
-"""Schema of each parameter, with its description."""
-
-TIMES = ("last", "from", "to")
+TEXT = {"type": "string"}
 
 ANSWERS = {tag_of(kind.__name__): kind for kind in answers.EVERY}
 """Class of each answer by its name."""
-
-OPERATIONS = (
-    *(
-        Operation("get", subject, f"get_{subject}", summary(ANSWERS[subject]), ANSWERS[subject])
-        for subject in QUERY_SUBJECTS
-    ),
-    Operation("post", "stop", "stop", summary(requests.Stop), None, None, ("press",)),
-    Operation(
-        *("post", "mesh", "upload_mesh", "Upload a mesh, which `place` then uses by its key."),
-        *(answers.Mesh, BINARY, ("name", "format", "main", "unit")),
-    ),
-    Operation("get", "scene", "download_scene", "Download the scene and its meshes.", ZIP),
-    Operation(
-        *("post", "scene", "upload_scene", "Upload a scene, which `load` then uses by its key."),
-        *(answers.Scene, ZIP),
-    ),
-    Operation("get", "robots", "list_robots", "List the robots that `choose_robot` takes.", JSON),
-    Operation(
-        *("post", "robots", "upload_robot"),
-        "Upload a .urdf, .xacro or .zip, which `choose_robot` then takes by its name.",
-        *(JSON, BINARY, ("name", "main")),
-    ),
-    Operation("get", "scripts", "list_scripts", "List the names of the scripts.", JSON),
-    Operation(
-        *("post", "scripts", "check_script"),
-        "List the problems of a script by line. Nothing is planned.",
-        *(JSON, "text/plain"),
-    ),
-    Operation("get", "scripts/{name}", "get_script", "Return the text of a script.", "text/plain"),
-    Operation(
-        *("post", "scripts/{name}", "save_script"),
-        "Save a valid script under a new name in the folder of `--programs`.",
-        *(None, "text/plain"),
-    ),
-    Operation(
-        *("get", "script.schema.json", "get_script_schema", "Return the JSON Schema of scripts."),
-        "application/schema+json",
-    ),
-    Operation("get", "openapi.json", "get_openapi", "Return this document.", JSON),
-    Operation(
-        *("get", "recording", "download_recording"),
-        "Download what was recorded, at most ten minutes of motion.",
-        *(BINARY, None, TIMES),
-    ),
-    Operation(
-        *("get", "recording/script", "download_recording_script"),
-        "Download a script that runs the recorded motion again.",
-        *("application/yaml", None, TIMES),
-    ),
-    Operation(
-        *("get", "episodes", "list_episodes", "List the episodes, and the one that runs."), JSON
-    ),
-    Operation(
-        *("post", "episodes", "change_episodes", "Start, end, judge or change an episode."),
-        *(JSON, JSON),
-    ),
-    Operation("get", "episodes/{number}", "download_episode", "Download an episode.", BINARY),
-)
-"""The paths beside `do`."""
 
 REFUSALS = {
     "401": "A token is required.",
@@ -249,74 +123,67 @@ REFUSALS = {
 """Refusals by status, each an ``answers.Refused``."""
 
 
-def _operation(name: str, about: str, answer: type | str | None) -> dict[str, Any]:
-    """Describe an operation by its name, one line of text, and its answer or its media type."""
-    done: dict[str, Any] = {"description": "Done."}
-    if isinstance(answer, str):
-        done |= _content(answer, CONTENTS[answer])
-    elif answer is not None:
-        done |= _content(JSON, _reference(answer))
-    refused = _content(JSON, _reference(answers.Refused))
-    refusals = {status: {"description": why, **refused} for status, why in REFUSALS.items()}
-    responses = {"204" if answer is None else "200": done, **refusals}
+def _operation(name: str, about: str, answer: Any = None) -> dict[str, Any]:
+    """Describe an operation by its name, one line of text, and the schema of its answer, if any."""
+    refused = _content(_reference(answers.Refused))
+    responses: dict[str, Any] = {
+        "204": {"description": "Done."},
+        **{status: {"description": why, **refused} for status, why in REFUSALS.items()},
+    }
+    if answer is not None:
+        responses["200"] = responses.pop("204") | _content(answer)
     return {"operationId": name, "summary": about, "responses": responses}
 
 
 def _do(request: Any, answer: Any) -> dict[str, Any]:
     """Describe the path of single requests, by the schemas of requests and answers."""
-    described = _operation("do", "Execute one request.", JSON)
+    described = _operation("do", "Execute one request.", answer)
     either = {"anyOf": [_reference(answers.Refused), _reference(answers.Done)]}
-    described["responses"]["200"] |= _content(JSON, answer)
     described["responses"]["409"] = {
         "description": "Refused at present, or its motion did not reach its end.",
-        **_content(JSON, either),
+        **_content(either),
     }
-    key = {
-        "pattern": "^[A-Za-z0-9_-]{16,64}$",
-        "description": "A secret key that identifies the program; others never see it.",
-    }
-    shown = {"maxLength": 40, "description": "The name of the program that others see."}
+    key = "A secret key that identifies the program; others never see it."
+    shown = "The name of the program that others see."
     return {
         **described,
         "description": "A request with `wait` is answered when its motion has ended; the open "
         "connection then counts as the heartbeat. After any other motion request the program sends "
         "ten requests a second until the arm rests, or the arm stops or pauses.",
         "parameters": [
-            _parameter("X-Program", "header", TEXT | key) | {"required": True},
-            _parameter("X-Name", "header", TEXT | shown),
+            _parameter("X-Program", "header", key, pattern="^[A-Za-z0-9_-]{16,64}$")
+            | {"required": True},
+            _parameter("X-Name", "header", shown, maxLength=40),
         ],
-        "requestBody": _content(JSON, request),
+        "requestBody": _content(request),
     }
 
 
-def _content(media: str, schema: Any) -> dict[str, Any]:
-    return {"content": {media: {"schema": schema}}}
+def _content(schema: Any) -> dict[str, Any]:
+    return {"content": {JSON: {"schema": schema}}}
 
 
 def _reference(kind: type) -> dict[str, str]:
     return {"$ref": REFERENCE.format(name=kind.__name__)}
 
 
-def _parameter(name: str, place: str, schema: Mapping[str, Any]) -> dict[str, Any]:
-    """Describe a parameter at ``place``: in the path, the query or the header."""
-    shape = {key: part for key, part in schema.items() if key != "description"}
-    parameter = {"name": name, "in": place, "schema": shape, "description": schema["description"]}
-    return parameter | ({"required": True} if place == "path" else {})
+def _parameter(name: str, place: str, about: str, **schema: Any) -> dict[str, Any]:
+    """Describe a parameter at ``place``: in the query or the header."""
+    return {"name": name, "in": place, "schema": TEXT | schema, "description": about}
 
 
 @functools.cache
-def openapi_json(kinds: tuple[type[Request], ...], served: frozenset[str] | None = None) -> bytes:
-    """Return the document as JSON.
-
-    ``kinds``: the requests of the server. ``served``: paths of the server, of which only the first
-    name below ``/api/v1`` counts; None to describe all paths.
-    """
+def openapi_json(kinds: tuple[type[Request], ...]) -> bytes:
+    """Return the document as JSON. ``kinds``: the requests of the server."""
     request, answer, components = schemas(kinds)
-    paths: dict[str, Any] = {}
-    for operation in OPERATIONS:
-        paths.setdefault(operation.path, {})[operation.method] = operation.description
-    paths["do"] = {"post": _do(request, answer)}
-    names = None if served is None else {_first(path.removeprefix(ROOT)) for path in served}
+    stop = _operation("stop", summary(requests.Stop))
+    about = "Name of this press. The same name again does not count again."
+    stop["parameters"] = [_parameter("press", "query", about, maxLength=MAX_PRESS_LENGTH)]
+    paths = {f"{ROOT}/do": {"post": _do(request, answer)}, f"{ROOT}/stop": {"post": stop}}
+    for subject in QUERY_SUBJECTS:
+        kind = ANSWERS[subject]
+        query = _operation(f"get_{subject}", summary(kind), _reference(kind))
+        paths[f"{ROOT}/{subject}"] = {"get": query}
     document = {
         "openapi": "3.1.0",
         "info": {
@@ -327,11 +194,7 @@ def openapi_json(kinds: tuple[type[Request], ...], served: frozenset[str] | None
         },
         "servers": [{"url": "/", "description": "The server that this document is from."}],
         "security": [{}, {"link": []}],
-        "paths": {
-            f"{ROOT}/{path}": operations
-            for path, operations in paths.items()
-            if names is None or _first(path) in names
-        },
+        "paths": paths,
         "components": {
             "schemas": components,
             "securitySchemes": {
@@ -347,20 +210,14 @@ def openapi_json(kinds: tuple[type[Request], ...], served: frozenset[str] | None
     return msgspec.json.encode(document)
 
 
-def _first(path: str) -> str:
-    """Return the first name of ``path``: `scripts` for `scripts/{name}`."""
-    return path.strip("/").partition("/")[0].partition("{")[0]
-
-
 def description_routes(context: RouteContext) -> list[BaseRoute]:
     """Return the route of the OpenAPI document, which everybody may read.
 
-    It describes the paths and requests of this server, also those of its extensions.
+    It describes the requests of this server, also those of its extensions.
     """
     hub = context.hub
 
-    async def openapi(request: HttpRequest) -> Response:
-        present = frozenset(getattr(route, "path", "") for route in request.app.routes)
-        return Response(openapi_json(hub.requests.kinds, present), media_type="application/json")
+    async def openapi(_request: HttpRequest) -> Response:
+        return Response(openapi_json(hub.requests.kinds), media_type=JSON)
 
     return [Route(f"{ROOT}/openapi.json", openapi)]
