@@ -12,9 +12,14 @@ import pytest
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.lease import Person, Role
 from katana450.errors import LeaseError
-from katana450.extensions.rosbridge.follow_goal import ErrorCode, FollowGoal, GoalError
-from katana450.extensions.rosbridge.goals import GoalHost, GoalStatus
-from katana450.extensions.rosbridge.ops import SendActionGoal
+from katana450.extensions.rosbridge.goals import (
+    ErrorCode,
+    FollowGoal,
+    GoalError,
+    GoalHost,
+    GoalStatus,
+)
+from katana450.extensions.rosbridge.protocol import SendActionGoal
 from katana450.server.api import answers
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.participants import Participant

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from katana450.extensions.rosbridge.ops import MAX_OP_BYTES
+from katana450.extensions.rosbridge.protocol import MAX_OP_BYTES
 from tests.browser.server import AppServer
 from tests.rosbridge.ros_client import (
     FOLLOW,

@@ -7,13 +7,7 @@ import pytest
 
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
-from katana450.extensions.rosbridge.messages import (
-    Header,
-    JointJog,
-    Time,
-    Twist,
-    Vector3,
-)
+from katana450.extensions.rosbridge.protocol import Header, JointJog, Time, Twist, Vector3
 from katana450.extensions.rosbridge.servoing import (
     LINEAR_SCALE,
     ROTATIONAL_SCALE,

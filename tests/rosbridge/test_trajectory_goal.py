@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.rosbridge.follow_goal import (
+from katana450.extensions.rosbridge.goals import (
     MAX_POINTS,
     CheckedTrajectory,
     ErrorCode,
     GoalError,
 )
-from katana450.extensions.rosbridge.messages import FollowJointTrajectory
+from katana450.extensions.rosbridge.protocol import FollowJointTrajectory
 from tests.rosbridge.ros_client import JOINTS, stamp, trajectory
 
 START = np.array([0.0, -1.19, 1.48, 0.14, 0.0])

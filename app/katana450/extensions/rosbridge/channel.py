@@ -13,15 +13,15 @@ import msgspec
 
 from katana450.arm.control.lease import HEARTBEAT_INTERVAL
 from katana450.errors import InputError, KatanaError, LeaseError
-from katana450.extensions.rosbridge import names, ops
-from katana450.extensions.rosbridge.follow_goal import FollowGoal
-from katana450.extensions.rosbridge.goals import ERROR_TEXT, Goal, GoalHost, GripperGoal
-from katana450.extensions.rosbridge.messages import (
-    Fields,
-    JointJog,
-    NoArguments,
-    TwistStamped,
+from katana450.extensions.rosbridge import protocol
+from katana450.extensions.rosbridge.goals import (
+    ERROR_TEXT,
+    FollowGoal,
+    Goal,
+    GoalHost,
+    GripperGoal,
 )
+from katana450.extensions.rosbridge.protocol import Fields, JointJog, NoArguments, TwistStamped
 from katana450.extensions.rosbridge.publications import Publications, Subscriptions
 from katana450.extensions.rosbridge.servoing import ServoStream
 from katana450.server.api import answers, requests
@@ -44,7 +44,7 @@ REPEAT_SECONDS = 1.0
 """[s] Time during which an equal refusal of messages of a topic is not repeated."""
 
 
-def status(why: str, op_id: ops.OpId = None, level: str = "error") -> dict[str, Any]:
+def status(why: str, op_id: protocol.OpId = None, level: str = "error") -> dict[str, Any]:
     """Return the status operation that gives a client the reason ``why``."""
     named = {} if op_id is None else {"id": op_id}
     return {"op": "status", **named, "level": level, "msg": why}
@@ -81,13 +81,13 @@ class RosChannel(Channel):
 
     # Channel
 
-    def decoded(self, text: str | bytes) -> ops.AnyOp:
+    def decoded(self, text: str | bytes) -> protocol.AnyOp:
         """Return the operation in ``text``. Raises InputError with the reason if it is invalid."""
-        return ops.decoded(text)
+        return protocol.decoded(text)
 
-    def id_of(self, text: str | bytes) -> ops.OpId:
+    def id_of(self, text: str | bytes) -> protocol.OpId:
         """Return the id in ``text``, which need not be a valid operation; None without one."""
-        return ops.id_of(text)
+        return protocol.id_of(text)
 
     def greet(self, participant: Participant) -> None:
         """Take ``participant``, which is the client. The protocol has no greeting."""
@@ -117,7 +117,7 @@ class RosChannel(Channel):
         driver = "" if self.participant is None else driver_key(self.hub, self.participant)
         try:
             with self.budget.charged(driver):
-                message = self._publications.message(names.resolved(topic))
+                message = self._publications.message(protocol.resolved(topic))
         except BusyError as error:
             self._subscriptions.delay(error.retry)
             return None, error.retry
@@ -140,9 +140,9 @@ class RosChannel(Channel):
 
     def answer(self, participant: Participant, request: Any) -> None:
         """Execute the operation ``request``. Raises KatanaError if it is refused."""
-        op: ops.AnyOp = request
+        op: protocol.AnyOp = request
         self.hub.heartbeat(participant)
-        if isinstance(op, ops.CallService) and op.traits.safety:
+        if isinstance(op, protocol.CallService) and op.traits.safety:
             self._trigger(op, requests.Stop())
             return
         charged = self.budget.charged(driver_key(self.hub, participant), question=False)
@@ -152,45 +152,49 @@ class RosChannel(Channel):
 
     # Operations
 
-    def _execute(self, participant: Participant, op: ops.AnyOp) -> None:
+    def _execute(self, participant: Participant, op: protocol.AnyOp) -> None:
         match op:
-            case ops.Subscribe():
+            case protocol.Subscribe():
                 self._subscriptions.add(op)
-            case ops.Unsubscribe():
+            case protocol.Unsubscribe():
                 self._subscriptions.remove(op.topic, op.id)
-            case ops.Advertise(topic=topic, type=kind):
+            case protocol.Advertise(topic=topic, type=kind):
                 self._check_commanded(topic, kind)
-            case ops.Unadvertise(topic=topic):
+            case protocol.Unadvertise(topic=topic):
                 self._check_commanded(topic)
-            case ops.Publish():
+            case protocol.Publish():
                 self._publish(op)
-            case ops.CallService():
+            case protocol.CallService():
                 self._call(op)
-            case ops.SendActionGoal():
+            case protocol.SendActionGoal():
                 self._send_goal(participant, op)
-            case ops.CancelActionGoal():
+            case protocol.CancelActionGoal():
                 self._cancel_goal(op)
 
     def _check_commanded(self, topic: str, kind: str = "") -> None:
         """Raise InputError unless clients can publish to ``topic``, with messages of ``kind``."""
-        topic = names.resolved(topic)
-        known = names.COMMANDED.get(topic)
+        topic = protocol.resolved(topic)
+        known = protocol.COMMANDED.get(topic)
         if known is None:
-            reason = "published by the server" if topic in names.PUBLISHED else "unknown"
+            reason = "published by the server" if topic in protocol.PUBLISHED else "unknown"
             raise InputError(
                 f"The topic {topic} is {reason}. Clients can publish to "
-                f"{', '.join(names.COMMANDED)}."
+                f"{', '.join(protocol.COMMANDED)}."
             )
-        if kind and not names.is_type(kind, known):
+        if kind and not protocol.is_type(kind, known):
             raise InputError(f"The messages of {topic} are {known}, not {kind}.")
 
-    def _publish(self, op: ops.Publish) -> None:
+    def _publish(self, op: protocol.Publish) -> None:
         self._check_commanded(op.topic)
         try:
-            if names.resolved(op.topic) == names.TWIST:
-                self._stream.twist(ops.read(op.msg, TwistStamped, names.TOPICS[names.TWIST]))
+            if protocol.resolved(op.topic) == protocol.TWIST:
+                self._stream.twist(
+                    protocol.read(op.msg, TwistStamped, protocol.TOPICS[protocol.TWIST])
+                )
             else:
-                self._stream.jog(ops.read(op.msg, JointJog, names.TOPICS[names.JOINT_JOG]))
+                self._stream.jog(
+                    protocol.read(op.msg, JointJog, protocol.TOPICS[protocol.JOINT_JOG])
+                )
         except BusyError:
             raise
         except KatanaError as error:
@@ -203,26 +207,26 @@ class RosChannel(Channel):
         if self._stream.moves:
             self._acting.set()
 
-    def _call(self, op: ops.CallService) -> None:
-        service = names.resolved(op.service)
-        if service not in names.SERVICES:
-            known = ", ".join(name for name in names.SERVICES if names.CANCEL not in name)
+    def _call(self, op: protocol.CallService) -> None:
+        service = protocol.resolved(op.service)
+        if service not in protocol.SERVICES:
+            known = ", ".join(name for name in protocol.SERVICES if protocol.CANCEL not in name)
             why = f"There is no service {service}. The services are {known}."
             self._respond(op, why, result=False)
             raise InputError(why)
-        if service in names.LISTS:
-            self._respond(op, names.LISTS[service])
-        elif service.endswith(names.CANCEL):
+        if service in protocol.LISTS:
+            self._respond(op, protocol.LISTS[service])
+        elif service.endswith(protocol.CANCEL):
             for goal in self._goals:
-                if names.resolved(goal.action) == service.removesuffix(names.CANCEL):
+                if protocol.resolved(goal.action) == service.removesuffix(protocol.CANCEL):
                     goal.cancel("The client cancelled it.")
             self._respond(op, {"return_code": 0, "goals_canceling": []})
-        elif service == names.HOLD_SERVICE:
+        elif service == protocol.HOLD_SERVICE:
             self._hold(op)
         else:
             self._trigger(op, requests.ClearStop())
 
-    def _hold(self, op: ops.CallService) -> None:
+    def _hold(self, op: protocol.CallService) -> None:
         """Bring the arm to rest: end the goals of this client, or give the command `hold`."""
         running = [goal for goal in self._goals if not (goal.ended or goal.cancelled)]
         for goal in running:
@@ -232,10 +236,10 @@ class RosChannel(Channel):
         else:
             self._trigger(op, requests.Hold())
 
-    def _trigger(self, op: ops.CallService, request: requests.Request) -> None:
+    def _trigger(self, op: protocol.CallService, request: requests.Request) -> None:
         """Execute ``request`` and answer a std_srvs/Trigger with its outcome."""
         try:
-            ops.read(op.args, NoArguments, "a call of std_srvs/Trigger")
+            protocol.read(op.args, NoArguments, "a call of std_srvs/Trigger")
         except InputError as error:
             # A stop is executed even if its arguments are invalid.
             if not isinstance(request, requests.Stop):
@@ -251,7 +255,7 @@ class RosChannel(Channel):
         else:
             self._respond(op, _triggered(answer))
 
-    async def _conclude_trigger(self, op: ops.CallService, pending: PendingAnswer) -> None:
+    async def _conclude_trigger(self, op: protocol.CallService, pending: PendingAnswer) -> None:
         self._respond(op, _triggered(await pending.answer()))
 
     def _later(self, work: Coroutine[Any, Any, None]) -> None:
@@ -259,28 +263,27 @@ class RosChannel(Channel):
         self._concluding.add(task)
         task.add_done_callback(self._concluding.discard)
 
-    def _respond(self, op: ops.CallService, values: Any, *, result: bool = True) -> None:
+    def _respond(self, op: protocol.CallService, values: Any, *, result: bool = True) -> None:
         named = {} if op.id is None else {"id": op.id}
         response = {"op": "service_response", **named, "service": op.service}
         self.notify({**response, "values": values, "result": result})
 
     # Actions
 
-    def _send_goal(self, participant: Participant, op: ops.SendActionGoal) -> None:
-        action = names.resolved(op.action)
-        known = names.ACTIONS.get(action)
+    def _send_goal(self, participant: Participant, op: protocol.SendActionGoal) -> None:
+        action = protocol.resolved(op.action)
+        known = protocol.ACTIONS.get(action)
         try:
             if op.id is None:
                 raise InputError("A goal needs an `id`, by which it can be cancelled.")
             if known is None:
-                raise InputError(
-                    f"There is no action {op.action}. The actions are {', '.join(names.ACTIONS)}."
-                )
-            if op.action_type and not names.is_type(op.action_type, known):
+                actions = ", ".join(protocol.ACTIONS)
+                raise InputError(f"There is no action {op.action}. The actions are {actions}.")
+            if op.action_type and not protocol.is_type(op.action_type, known):
                 raise InputError(f"The action {op.action} is {known}, not {op.action_type}.")
             self._check_goals(op)
             host = GoalHost(self.hub, participant, self._handle, self.notify, self._show_newest)
-            follows = action == names.FOLLOW
+            follows = action == protocol.FOLLOW
             earlier = [goal for goal in self._goals if isinstance(goal, FollowGoal)]
             goal = FollowGoal(host, op, earlier) if follows else GripperGoal(host, op)
         except InputError as error:
@@ -291,7 +294,7 @@ class RosChannel(Channel):
         self._later(goal.run())
         self._acting.set()
 
-    def _check_goals(self, op: ops.SendActionGoal) -> None:
+    def _check_goals(self, op: protocol.SendActionGoal) -> None:
         """Raise InputError if the id of ``op`` is taken, or the client has too many goals."""
         self._goals = [goal for goal in self._goals if not goal.ended]
         if any(goal.id == op.id for goal in self._goals):
@@ -299,7 +302,7 @@ class RosChannel(Channel):
         if len(self._goals) >= MAX_GOALS:
             raise InputError(f"A client can have {MAX_GOALS} goals at a time. Wait for a result.")
 
-    def _cancel_goal(self, op: ops.CancelActionGoal) -> None:
+    def _cancel_goal(self, op: protocol.CancelActionGoal) -> None:
         for goal in self._goals:
             if (goal.id, goal.action) == (op.id, op.action):
                 goal.cancel("The client cancelled it.")

@@ -7,15 +7,11 @@ import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-import numpy as np
-
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
-from katana450.extensions.rosbridge import names
-from katana450.extensions.rosbridge.messages import Fields, Header, Time, time_of
-from katana450.extensions.rosbridge.ops import OpId, Subscribe
+from katana450.extensions.rosbridge import protocol
+from katana450.extensions.rosbridge.protocol import Fields, Header, OpId, Subscribe, Time, time_of
 from katana450.maths.geometry import so3
-from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers
 from katana450.server.service import serialize
 from katana450.server.service.arm_handle import ArmHandle
@@ -28,10 +24,10 @@ OK, WARN, ERROR, STALE = 0, 1, 2, 3
 """Levels of a diagnostic_msgs/DiagnosticStatus."""
 
 PERIODS: Mapping[str, float] = {
-    names.JOINT_STATES: 0.02,
-    names.TF: 1.0 / 30.0,
-    names.DIAGNOSTICS: 1.0,
-    names.STATE: 0.1,
+    protocol.JOINT_STATES: 0.02,
+    protocol.TF: 1.0 / 30.0,
+    protocol.DIAGNOSTICS: 1.0,
+    protocol.STATE: 0.1,
 }
 """[s] Interval of each topic. A topic without one is sent once, to each new subscriber."""
 
@@ -49,26 +45,24 @@ class Publications(NamedTuple):
         """
         arm = self.hub.present()
         match topic:
-            case names.ROBOT_DESCRIPTION:
+            case protocol.ROBOT_DESCRIPTION:
                 return {"data": self.description()}
-            case names.DIAGNOSTICS:
+            case protocol.DIAGNOSTICS:
                 return diagnostics(self.hub)
-            case names.TF_STATIC:
+            case protocol.TF_STATIC:
                 return transforms(arm, time_of(time.time()), moving=False)
         if arm.age > SILENT_AFTER:
             return None
-        stamp = time_of(self.stamp(arm))
+        now = time.time()
+        # An arm at rest has its state now.
+        age = max(self.hub.clock() - arm.state.t, 0.0) if arm.state.moving else 0.0
+        stamp = time_of(now - age)
         match topic:
-            case names.JOINT_STATES:
+            case protocol.JOINT_STATES:
                 return joint_state(arm, stamp)
-            case names.TF:
+            case protocol.TF:
                 return transforms(arm, stamp, moving=True)
         return {"data": answers.encoded(serialize.state(self.hub))}
-
-    def stamp(self, arm: ArmHandle) -> float:
-        """Return the time of the newest state [s since the epoch]; an arm at rest has it now."""
-        now = time.time()
-        return now - max(self.hub.clock() - arm.state.t, 0.0) if arm.state.moving else now
 
 
 def joint_state(arm: ArmHandle, stamp: Time) -> Fields:
@@ -147,20 +141,13 @@ def _arm_status(now: answers.State) -> Fields:
     }
 
 
-def frames(robot: Robot, values: Mapping[str, float]) -> dict[str, FloatArray]:
-    """Return the rotation (3, 3) of each link's frame in {S} with the joints at ``values``."""
-    T_base_shoulder = np.eye(4) if robot.arm is None else robot.arm.T_base_shoulder
-    R = T_base_shoulder[:3, :3].T
-    return {name: R @ T[:3, :3] for name, T in robot.frames(values).items()}
-
-
 MAX_SUBSCRIPTIONS = 16
 """Maximum number of subscriptions of one client to one topic."""
 
 RETRY_SECONDS = 0.1
 """[s] Time after which a topic that had no message is tried again."""
 
-URGENT = (names.STATE, names.DIAGNOSTICS)
+URGENT = (protocol.STATE, protocol.DIAGNOSTICS)
 """Topics that are due at once when a stop begins, is confirmed or is cleared."""
 
 
@@ -178,14 +165,14 @@ class Subscriptions:
 
     def add(self, op: Subscribe) -> None:
         """Subscribe; a topic without an interval is sent again. Raises InputError."""
-        name = names.resolved(op.topic)
-        known = names.PUBLISHED.get(name)
+        name = protocol.resolved(op.topic)
+        known = protocol.PUBLISHED.get(name)
         if known is None:
-            reason = "is only for commands" if name in names.COMMANDED else "does not exist"
+            reason = "is only for commands" if name in protocol.COMMANDED else "does not exist"
             raise InputError(
-                f"The topic {op.topic} {reason}. The topics are {', '.join(names.PUBLISHED)}."
+                f"The topic {op.topic} {reason}. The topics are {', '.join(protocol.PUBLISHED)}."
             )
-        if op.type and not names.is_type(op.type, known):
+        if op.type and not protocol.is_type(op.type, known):
             raise InputError(f"The messages of {op.topic} are {known}, not {op.type}.")
         if op.compression not in (None, "", "none"):
             raise InputError(f"There is no compression {op.compression[:40]!r}, only 'none'.")
@@ -211,7 +198,7 @@ class Subscriptions:
     def hurry(self) -> None:
         """Make the topics that report a stop due."""
         for topic in self._due:
-            if names.resolved(topic) in URGENT:
+            if protocol.resolved(topic) in URGENT:
                 self._due[topic] = self._clock()
 
     def next_due(self) -> tuple[str | None, float | None]:
@@ -226,7 +213,7 @@ class Subscriptions:
 
     def sent(self, topic: str) -> None:
         """Note that a message of ``topic`` is being sent now."""
-        if names.resolved(topic) not in PERIODS:
+        if protocol.resolved(topic) not in PERIODS:
             del self._due[topic]
             return
         t, interval = self._clock(), min(self._intervals[topic].values())

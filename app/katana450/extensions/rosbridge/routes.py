@@ -13,7 +13,6 @@ import logging
 import mimetypes
 import secrets
 from pathlib import Path
-from typing import NamedTuple
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -35,31 +34,17 @@ MESHES = "/rosbridge/meshes"
 """Path of the meshes; the secret and the path of a file follow."""
 
 
-class ServedPackage(NamedTuple):
-    """The package of a robot: its description with the meshes.
-
-    Attributes:
-        text: the URDF, whose meshes are at ``package://PATH``; empty without one.
-        files: content of each file by its PATH, which begins with the name of the package.
-    """
-
-    text: str
-    files: dict[str, bytes]
-
-
 @functools.cache
-def description_of(urdf: Path) -> ServedPackage:
-    """Return the package that `export urdf` makes of ``urdf``, without a text if it is invalid.
+def package_of(urdf: Path) -> dict[str, bytes]:
+    """Return the files of the package that `export urdf` makes of ``urdf``, by their paths.
 
-    The first call takes seconds.
+    There are none if ``urdf`` is invalid. The first call takes seconds.
     """
     try:
-        files = packaged(urdf)
+        return packaged(urdf)
     except RobotDescriptionError as error:
         log.warning("There is no /robot_description: %s", error)
-        return ServedPackage("", {})
-    (text,) = (content.decode() for path, content in files.items() if path.endswith(".urdf"))
-    return ServedPackage(text, files)
+        return {}
 
 
 def ros_routes(context: RouteContext, urdf: Path) -> list[BaseRoute]:
@@ -71,19 +56,19 @@ def ros_routes(context: RouteContext, urdf: Path) -> list[BaseRoute]:
         """Serve one client until its websocket closes."""
         # Without an identity the websocket is refused below.
         known = client_of(authenticator, socket) is not None
-        text = (await asyncio.to_thread(description_of, urdf)).text if known else ""
+        files = await asyncio.to_thread(package_of, urdf) if known else {}
         scheme = "https" if authenticator.address.cookies_are_secure else "http"
         folder = f"{scheme}://{socket.headers['host']}{MESHES}/{secret}/"
-        text = text.replace('filename="package://', f'filename="{folder}')
-        make = functools.partial(RosChannel, publications=Publications(hub, lambda: text))
+        text = b"".join(content for path, content in files.items() if path.endswith(".urdf"))
+        shown = text.decode().replace('filename="package://', f'filename="{folder}')
+        make = functools.partial(RosChannel, publications=Publications(hub, lambda: shown))
         await serve_socket(hub, authenticator, context.budgets, socket, make, RosLine)
 
     def mesh(request: Request) -> Response:
         """Answer with a file of the description, to everybody who knows its address."""
         key, path = request.path_params["key"].encode(), request.path_params["path"]
-        if not secrets.compare_digest(key, secret.encode()):
-            raise HTTPException(404)
-        content = description_of(urdf).files.get(path)
+        known = secrets.compare_digest(key, secret.encode())
+        content = package_of(urdf).get(path) if known else None
         if content is None:
             raise HTTPException(404)
         headers = {

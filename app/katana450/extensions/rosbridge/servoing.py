@@ -10,24 +10,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 
 import numpy as np
 
 from katana450.arm.control.commands.joint_commands import JOG_TIME
 from katana450.errors import InputError, KatanaError
-from katana450.extensions.rosbridge.messages import (
-    Header,
-    JointJog,
-    Twist,
-    TwistStamped,
-    Vector3,
-)
-from katana450.extensions.rosbridge.publications import axis_names, frames
+from katana450.extensions.rosbridge.protocol import Header, JointJog, Twist, TwistStamped, Vector3
+from katana450.extensions.rosbridge.publications import axis_names
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.tool import pitched_frame
 from katana450.server.api import answers, requests
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
 
 COMMAND_TIMEOUT = 0.1
@@ -109,31 +104,28 @@ def joint_rates(jog: JointJog, joints: Sequence[str]) -> FloatArray:
             f"There are {len(jog.joint_names)} names of joints and {len(jog.velocities)} "
             "velocities. Send one velocity for each joint."
         )
-    check_joints(jog.joint_names, joints)
+    unknown = [name for name in jog.joint_names if name not in joints]
+    if unknown:
+        raise InputError(f"There is no joint {unknown[0]!r}. The joints are {', '.join(joints)}.")
+    if len(set(jog.joint_names)) != len(jog.joint_names):
+        raise InputError("A joint is named twice.")
     velocities = dict(zip(jog.joint_names, jog.velocities, strict=True))
     for name, fraction in velocities.items():
         _check_fraction(fraction, f"The velocity of {name}")
     return np.array([JOINT_SCALE * velocities.get(name, 0.0) for name in joints])
 
 
-def check_joints(names: Sequence[str], joints: Sequence[str]) -> None:
-    """Raise InputError unless ``names`` are different ones of ``joints``."""
-    unknown = [name for name in names if name not in joints]
-    if unknown:
-        raise InputError(f"There is no joint {unknown[0]!r}. The joints are {', '.join(joints)}.")
-    if len(set(names)) != len(names):
-        raise InputError("A joint is named twice.")
-
-
-def rotation_of(frame: str, frames: Mapping[str, FloatArray], root: str) -> FloatArray:
-    """Return the orientation (3, 3) in {S} of the frame ``frame``, by default of ``root``.
+def rotation_of(frame: str, arm: ArmHandle) -> FloatArray:
+    """Return the orientation (3, 3) in {S} of the link ``frame``, by default of the root.
 
     Raises InputError for an unknown frame.
     """
-    rotation = frames.get(frame or root)
-    if rotation is None:
+    robot, state = arm.robot, arm.state
+    frames = robot.frames(robot.joint_values(state.q, state.gripper))
+    T = frames.get(frame or robot.links[0].name)
+    if T is None:
         raise InputError(f"There is no frame {frame!r}. The frames are {', '.join(frames)}.")
-    return rotation
+    return T[:3, :3] if robot.arm is None else robot.arm.T_base_shoulder[:3, :3].T @ T[:3, :3]
 
 
 def _scaled(vector: Vector3, scale: float, part: str) -> FloatArray:
@@ -146,10 +138,6 @@ def _scaled(vector: Vector3, scale: float, part: str) -> FloatArray:
 def _check_fraction(fraction: float, what: str) -> None:
     if not abs(fraction) <= 1.0:
         raise InputError(f"{what} is {fraction:g}; it must be from -1 to 1 without unit.")
-
-
-LEAD = JOG_TIME
-"""[s] Time by which the angles that are sent may lead those of the arm."""
 
 
 class ServoMotion(Enum):
@@ -188,8 +176,7 @@ class ServoStream:
         check_fresh(message.header, time.time())
         arm = self._hub.present()
         state, mounted = arm.state, arm.arm
-        rotations = frames(arm.robot, arm.robot.joint_values(state.q, state.gripper))
-        R = rotation_of(message.header.frame_id, rotations, arm.robot.links[0].name)
+        R = rotation_of(message.header.frame_id, arm)
         pitched = None
         if mounted.kinematics_to(state.tool).freedoms == 5:
             pitched = pitched_frame(mounted.chain_to(state.tool), state.q)
@@ -238,7 +225,8 @@ class ServoStream:
     def _follow(self) -> None:
         """Send the angles at which the joints should be now."""
         state, t = self._hub.present().state, self._hub.clock()
-        lead = LEAD * np.abs(self._rates)
+        # The angles that are sent may lead those of the arm by the time that a jog lasts.
+        lead = JOG_TIME * np.abs(self._rates)
         q = self._q + self._rates * (t - self._t)
         # The lead stays bounded if the arm is slower or cannot continue.
         self._q, self._t = np.clip(q, state.setpoint - lead, state.setpoint + lead), t
