@@ -13,8 +13,13 @@ from gymnasium.utils.env_checker import check_env
 
 import katana450.learn  # noqa: F401 (it registers them)
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.extensions.learn.environment import Numbers, TaskEnvironment
-from katana450.extensions.learn.tasks import FILLED, TASKS, WANTED
+from katana450.extensions.learn.environment import (
+    FILLED,
+    TASKS,
+    WANTED,
+    Numbers,
+    TaskEnvironment,
+)
 from tests.general_arms.test_published_hands import KINDS
 from tests.learn.policy import CLOSED, GRASP, OPEN, Policy, pour, put
 from tests.robot.public_arms import J, urdf
