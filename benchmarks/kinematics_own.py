@@ -16,7 +16,7 @@ from benchmarks.kinematics_task import FloatArray, Task, urdf
 from katana450 import tolerances
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import Numerical
-from katana450.library.loading import load
+from katana450.library.arm import load
 from katana450.maths.geometry import screws
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.extensions.media.scene import Camera
+from katana450.extensions.media.picture import Camera
 
 spot = st.floats(-2.0, 2.0)
 

@@ -16,17 +16,18 @@ from katana450.arm.robot.initial_camera import InitialCamera as Viewpoint
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
-from katana450.extensions.media.picture import Picture, picture
-from katana450.extensions.media.report_pictures import tube
-from katana450.extensions.media.scene import (
+from katana450.extensions.media.picture import (
     FLOOR,
     NOWHERE,
     Camera,
     Item,
+    Picture,
     RenderScene,
     Tracer,
     first_hits,
+    picture,
 )
+from katana450.extensions.media.report_pictures import tube
 from katana450.maths.geometry import se3
 from katana450.maths.water.surface import COLOUR
 from katana450.resources import URDF_PATH

@@ -15,7 +15,6 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.export.playback import load_motion
 from katana450.extensions.media import figures
-from katana450.extensions.media.figures import DRAWN, magnification
 from katana450.extensions.media.measures import PourRecord
 from katana450.extensions.media.report import Report
 from katana450.extensions.programs.run.measured_run import MeasuredRun
@@ -103,22 +102,6 @@ def test_measured_arm_is_apart_from_its_setpoints(tmp_path: Path) -> None:
     assert "measured.png" not in {
         path.name for path in commanded.write(tmp_path / "exact", WRITTEN)
     }
-
-
-def test_distances_are_drawn_by_a_round_factor_that_fits() -> None:
-    plan = plan_script(parse("frame: base\nsteps: [line: {by: {y: 60}}]"), URDF_PATH)
-    arm, start = plan.robot.require_arm(), plan.start
-    for angle, magnified in ((1e-4, True), (1e-3, True), (3e-2, False)):
-        offset = np.array((0.0, angle, 0.0, 0.0, 0.0))
-        driver = LaggingDriver(arm, start.q, start.gripper, 0, offset)
-        run = MeasuredRun.of(arm, run_by_clock(plan, driver).states)
-        assert run is not None
-        factor = magnification(run.deviations)
-        worst = max(float(deviation.error.max()) for deviation in run.deviations)
-        assert f"{factor:.0e}"[0] in "125"
-        assert (factor > 1.0) is magnified
-        if magnified:
-            assert 0.4 * DRAWN <= factor * worst / 0.06 <= 1.01 * DRAWN
 
 
 def test_water_figure_is_drawn(run: tuple[Planned, Report]) -> None:

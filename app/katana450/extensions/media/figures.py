@@ -15,19 +15,12 @@ from katana450.extensions.media.measures import PathTrace, PourRecord
 from katana450.extensions.programs.run.measured_run import Deviation, MeasuredRun
 from katana450.extensions.programs.run.simulation import Simulation
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.planning.path import point_derivatives
-
-DRAWN = 0.15
-"""[1] Maximum distance of the drawn path of the tool from the desired one, by the size of that."""
 
 GAP = 0.3
 """[s] Time between two measurements above which a line is broken."""
 
 RIGHT: dict[str, Any] = {"ha": "right", "va": "top"}
 """Alignment of a text in the upper right corner."""
-
-SAMPLES = 400
-"""Number of intervals of a drawn path."""
 
 INK, FAINT, DESIRED, ERROR = "#1f2933", "#cbd2d9", "#9aa5b1", "#c2410c"
 """Colours of text, grid, desired paths and errors."""
@@ -98,46 +91,15 @@ def as_png(draw: Callable[Concatenate[Any, Drawing], Any]) -> Callable[Drawing, 
 
 @as_png
 def measured_figure(plt: Any, run: MeasuredRun) -> Any:
-    """Draw path, distances from it and errors of the joints; of these without paths."""
-    deviations = run.deviations
-    figure = plt.figure(figsize=(7.2, 5.2 if deviations else 3.0))
-    if deviations:
-        space = figure.add_axes((-0.02, 0.06, 0.53, 0.9), projection="3d")
-        _draw_paths(plt, space, deviations)
-        figure.text(0.02, 0.935, "Path of the tool", fontsize=10.0, fontweight="bold")
-        upper = figure.add_axes((0.6, 0.57, 0.38, 0.35))
-        _draw_distances(upper, deviations)
-        lower = figure.add_axes((0.6, 0.1, 0.38, 0.34), sharex=upper)
-    else:
-        lower = figure.add_axes((0.1, 0.16, 0.88, 0.72))
-    _draw_joint_errors(lower, run)
+    """Draw the distances from the paths, if there are any, and the errors of the joints."""
+    rows = 2 if run.deviations else 1
+    figure, panels = plt.subplots(
+        rows, 1, figsize=(7.2, 2.6 * rows), sharex=True, layout="constrained", squeeze=False
+    )
+    if run.deviations:
+        _draw_distances(panels[0, 0], run.deviations)
+    _draw_joint_errors(panels[-1, 0], run)
     return figure
-
-
-def magnification(deviations: tuple[Deviation, ...]) -> float:
-    """Return the round number, at least 1, by which distances from paths are best drawn."""
-    points = np.concatenate([deviation.nearest for deviation in deviations])
-    size = float((points.max(axis=0) - points.min(axis=0)).max())
-    worst = max(float(deviation.error.max()) for deviation in deviations)
-    if worst <= 0.0 or size <= 0.0:
-        return 1.0
-    most = max(DRAWN * size / worst, 1.0)
-    power = 10.0 ** math.floor(math.log10(most))
-    return power * max(step for step in (1.0, 2.0, 5.0) if power * step <= most)
-
-
-def _draw_paths(plt: Any, space: Any, deviations: tuple[Deviation, ...]) -> None:
-    times = magnification(deviations)
-    by = f", distances × {times:g}" if times > 1.0 else ""
-    drawn: list[FloatArray] = []
-    for number, deviation in enumerate(deviations):
-        desired = 1e3 * point_derivatives(deviation.path, np.linspace(0.0, 1.0, SAMPLES + 1))[0]
-        magnified = 1e3 * (deviation.nearest + times * (deviation.measured - deviation.nearest))
-        names = ("desired", f"measured{by}") if number == 0 else (None, None)
-        _draw_path(space, desired, magnified, ERROR, names)
-        drawn += [desired, magnified]
-    _frame(plt, space, np.concatenate(drawn))
-    space.legend(loc="upper center", bbox_to_anchor=(0.54, 0.06), fontsize=8.0)
 
 
 def _draw_distances(panel: Any, deviations: tuple[Deviation, ...]) -> None:
@@ -193,7 +155,9 @@ def path_figure(plt: Any, paths: Sequence[PathTrace]) -> Any:
     for number, path in enumerate(paths):
         desired, traced = 1e3 * path.desired, 1e3 * path.traced
         names = ("desired", "traced") if number == 0 else (None, None)
-        _draw_path(space, desired, traced, AXES[0], names)
+        space.plot(*desired.T, color=DESIRED, linewidth=4.0, alpha=0.7, label=names[0])
+        space.plot(*traced.T, color=AXES[0], linewidth=1.1, label=names[1])
+        space.scatter(*desired[0], color=INK, s=14)
     sigma, errors = largest(paths)
     errors = 1e3 * errors / 10.0**power
     panel.fill_between(100.0 * sigma, errors, color=ERROR, alpha=0.15, linewidth=0.0)
@@ -318,15 +282,6 @@ def _second(panel: Any, label: str) -> Any:
     second.set_ylabel(label)
     second.grid(visible=False)
     return second
-
-
-def _draw_path(
-    space: Any, desired: FloatArray, traced: FloatArray, colour: str, names: Sequence[str | None]
-) -> None:
-    """Draw a desired path (k, 3) [mm], and the one that was traced, in ``colour``, over it."""
-    space.plot(*desired.T, color=DESIRED, linewidth=4.0, alpha=0.7, label=names[0])
-    space.plot(*traced.T, color=colour, linewidth=1.1, label=names[1])
-    space.scatter(*desired[0], color=INK, s=14)
 
 
 def _frame(plt: Any, space: Any, points: FloatArray) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from katana450.cli.arm_options import add_arm_options
-from katana450.cli.option_values import size
+from katana450.cli.option_values import add_arm_options, size
 from katana450.extensions.export.options import add_shown_options
 
 CAMERAS = ("free", "front", "side", "top", "tool")

@@ -20,7 +20,6 @@ from katana450.atomic import write_files, writer_of
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.media import figures
-from katana450.extensions.media.figures import measured_figure
 from katana450.extensions.media.measures import (
     Bound,
     PourRecord,
@@ -199,7 +198,7 @@ class Report:
         if paths:
             images["path.png"] = figures.path_figure(paths)
         if self.measured is not None:
-            images["measured.png"] = measured_figure(self.measured)
+            images["measured.png"] = figures.measured_figure(self.measured)
         images["joints.png"] = figures.joints_figure(self.run)
         images["speeds.png"] = figures.speeds_figure(self.run)
         if self._pour is not None:
@@ -275,12 +274,10 @@ CAPTIONS = {
         ),
     ),
     "measured.png": (
-        "The measured arm beside its setpoints: path, distances from it, and error of each joint",
+        "The measured arm beside its setpoints: distances from the path, and error of each joint",
         (
-            "Left: the desired path and that of the measured tool, whose distances from the path "
-            "are magnified as stated. Right, above: the distances of the setpoints and of the "
-            "measured tool from the path. Below: measured joints minus where the driver had sent "
-            "them by then."
+            "Above: the distances of the setpoints and of the measured tool from the path. Below: "
+            "measured joints minus where the driver had sent them by then."
         ),
     ),
     "joints.png": (

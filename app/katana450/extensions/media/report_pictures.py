@@ -17,8 +17,7 @@ from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
-from katana450.extensions.media.picture import picture
-from katana450.extensions.media.scene import Camera, Item
+from katana450.extensions.media.picture import Camera, Item, picture
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.programs.run.measured_run import commanded_errors, path_of
 from katana450.extensions.programs.run.simulation import Simulation

@@ -16,8 +16,8 @@ from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.page import FPS, recorded
 from katana450.extensions.media.film import check_filmable, write_film
-from katana450.extensions.media.rendering_pool import Shot, rendering_pool
-from katana450.extensions.media.scene import check_traceable
+from katana450.extensions.media.picture import check_traceable
+from katana450.extensions.media.stage import Shot, rendering_pool
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.datasets.sampling import RecordedStates, frame_times
 from katana450.extensions.recording.files.recording_file import RecordingFile
