@@ -32,14 +32,14 @@ if TYPE_CHECKING:
     from katana450.extensions.general_arms.nearest import NearestPose as NearestPose
     from katana450.extensions.reachability.reachability import ReachabilityMap as ReachabilityMap
     from katana450.library.arm import Arm as Arm
-    from katana450.library.loading import load as load
+    from katana450.library.arm import load as load
     from katana450.library.motion_plan import MotionPlan as MotionPlan
+    from katana450.library.motion_plan import Trajectory as Trajectory
     from katana450.library.recording import Recording as Recording
     from katana450.library.recording import open as open
     from katana450.library.script_writer import ScriptWriter as ScriptWriter
     from katana450.library.script_writer import program as program
     from katana450.library.solutions import IKSolutions as IKSolutions
-    from katana450.library.trajectory import Trajectory as Trajectory
     from katana450.library.viewer import Viewer as Viewer
     from katana450.maths.kinematics.branch import Branch as Branch
     from katana450.maths.kinematics.pose import SE3 as SE3

@@ -22,7 +22,7 @@ METHODS = ("fk", "ik", "nearest", "jacobian", "plan", "line", "circle", "reachab
 
 MUST_HAVE = {f"katana450.library.arm.Arm.{name}" for name in METHODS} | {
     f"katana450.library.{name}"
-    for name in ("loading.load", "motion_plan.MotionPlan.sample", "motion_plan.MotionPlan.plot")
+    for name in ("arm.load", "motion_plan.MotionPlan.sample", "motion_plan.MotionPlan.plot")
 }
 MUST_HAVE.add("katana450.maths.kinematics.pose.SE3")
 

@@ -1,17 +1,24 @@
-"""A plan of the arm, for use in programs: it can be sampled, plotted, shown or run."""
+"""A plan of the arm, for use in programs: it can be sampled, plotted, shown or run.
+
+matplotlib is loaded when a plan is plotted.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from katana450.errors import InputError
 from katana450.library.pose_frame import PoseFrame
-from katana450.library.trajectory import Trajectory, sampled
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.planning.plan import Plan
+from katana450.maths.planning.plan import Plan, Segment
 
 if TYPE_CHECKING:
     from katana450.client import Client
@@ -23,6 +30,36 @@ DRAWN_SAMPLES: Final = 400
 
 MAX_WAIT: Final = 2.0
 """[s] Time for which a run waits until a slow machine or connection takes a sample in time."""
+
+
+MAX_SAMPLES = 1_000_000
+"""Maximum number of samples; their poses take 128 MB."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Samples of a plan. Every sample is evaluated on the plan; nothing is interpolated.
+
+    Attributes:
+        t: (N,) times from the start [s], at equal steps except the last, which is the end.
+        q, qd, qdd: (N, n) joint angles and their derivatives [rad, rad/s, rad/s^2].
+        T: (N, 4, 4) poses of the tool in the frame of the arm object [m].
+    """
+
+    t: FloatArray
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
+    T: FloatArray
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.t)
+
+    @property
+    def points(self) -> FloatArray:
+        """(N, 3) positions of the tool point [m]."""
+        return self.T[:, :3, 3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +122,7 @@ class MotionPlan:
         >>> bool(np.allclose(samples.points[-1] - samples.points[0], (0.0, 0.0, -0.05)))
         True
         """
-        return sampled(self.core, dt, self.chain, self.pose_frame)
+        return _sampled(self.core, dt, self.chain, self.pose_frame)
 
     def plot(self) -> Any:
         """Draw the tool's path and the joints over time; return the matplotlib ``Figure``.
@@ -95,9 +132,7 @@ class MotionPlan:
         >>> figure = arm.circle((0.15, 0.0, -0.11), 0.1).plot()
         >>> figure.savefig("circle.png")  # doctest: +SKIP
         """
-        from katana450.library.plot import figure_of
-
-        return figure_of(self.sample(self.duration / DRAWN_SAMPLES))
+        return _figure(self.sample(self.duration / DRAWN_SAMPLES))
 
     def run(self, client: Client, dt: float = 0.02, speed: float = 1.0) -> State:
         """Drive the arm of a server along this plan; return its state once it rests at the end.
@@ -152,3 +187,64 @@ def _has_waited(client: Client, sample: Request) -> bool:
             time.sleep(refusal.retry)
         else:
             return has_waited
+
+
+def _sampled(plan: Plan, dt: float, chain: Chain, frame: PoseFrame) -> Trajectory:
+    """Sample ``plan`` every ``dt`` [s] and at its end. Raises InputError for an invalid ``dt``."""
+    if not (isinstance(dt, int | float) and math.isfinite(dt) and dt > 0.0):
+        raise InputError(f"The sampling time must be a number of seconds above 0, not {dt!r}.")
+    count = math.ceil(plan.duration / dt - 1e-9)
+    if count >= MAX_SAMPLES:
+        raise InputError(
+            f"A sampling time of {dt:g} s gives {count} samples of this plan; "
+            f"choose one that gives fewer than {MAX_SAMPLES}."
+        )
+    t = np.append(dt * np.arange(count), plan.duration)
+    starts = np.cumsum([0.0, *(segment.scaling.duration for segment in plan.segments)])
+    numbers = np.searchsorted(starts[1:-1], t, side="right")
+    moved = np.array(
+        [
+            _motion(plan.segments[number], time - float(starts[number]))
+            for number, time in zip(numbers.tolist(), t.tolist(), strict=True)
+        ]
+    )
+    q, qd, qdd = (frozen(moved[:, order]) for order in range(3))
+    return Trajectory(frozen(t), q, qd, qdd, frozen(frame.from_shoulder(forward_batch(chain, q))))
+
+
+def _motion(segment: Segment, t: float) -> FloatArray:
+    """Return (3, n) angles, speeds and accelerations ``t`` [s] after the start of ``segment``."""
+    tau, speed, acceleration = segment.scaling.motion_after(t)
+    moving = segment.at(tau)
+    return np.array(
+        (
+            moving.q,
+            speed * moving.first,
+            speed**2 * moving.second + acceleration * moving.first,
+        )
+    )
+
+
+def _figure(samples: Trajectory) -> Any:
+    """Draw ``samples`` of a plan and return the matplotlib ``Figure``, still open."""
+    from katana450.extensions.media.figures import AXES, STYLE, TIME, draw_joints, equal_axes
+
+    plt = import_module("matplotlib.pyplot")
+    points = 1e3 * samples.points
+    with plt.rc_context(STYLE):
+        figure = plt.figure(figsize=(9.0, 3.9), layout="constrained")
+        space = figure.add_subplot(1, 2, 1, projection="3d")
+        space.plot(*points.T, color=AXES[0], linewidth=1.4)
+        space.scatter(*points[0], color=AXES[1], s=16, label="start")
+        equal_axes(space, points)
+        space.set_title("Path of the tool point")
+        space.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
+        space.legend(loc="upper left", fontsize=8.0)
+        panel = figure.add_subplot(1, 2, 2)
+        draw_joints(panel, samples.t, np.degrees(samples.q))
+        panel.set_title("Joint angles")
+        panel.set_xlabel(TIME)
+        panel.set_ylabel("angle (deg)")
+        panel.legend(ncols=samples.q.shape[1], fontsize=8.0, loc="upper center")
+        panel.margins(x=0.0, y=0.15)
+    return figure

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -178,12 +177,6 @@ class Recording:
         """All episodes, by number; the file of an episode has one. Raises InputError."""
         with RecordingFile.open(self.path) as file:
             return episodes_in(file)
-
-    @property
-    def settings(self) -> Mapping[str, Any]:
-        """Settings of the session. Raises InputError for a recording without them."""
-        with RecordingFile.open(self.path) as file:
-            return msgspec.structs.asdict(file.settings)
 
     def verify(self, urdf: str | os.PathLike[str] | None = None) -> Verification:
         """Simulate the commands again, and return the comparison with every recorded tick.

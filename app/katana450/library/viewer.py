@@ -9,7 +9,6 @@ import io
 import threading
 import time
 from collections.abc import Callable
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -152,12 +151,7 @@ class Viewer:
         """Return the viewer, which is closed at the end of the context."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Close the viewer."""
         self.close()
 
