@@ -17,14 +17,15 @@ import numpy as np
 
 import katana450
 from katana450.arm.control.commands.act import Request
-from katana450.client import acts, episode_acts
+from katana450.client import acts
 from katana450.extensions.programs.language.declaration import Schema
 from katana450.library import step_methods
+from katana450.server.api.episode_requests import EpisodeRequest
 
 PACKAGE = Path(katana450.__file__).parent
 
 ACTS_HEAD = """\
-# Written by `python -m docs.stubs` from the classes of the acts.
+# Written by `python -m docs.stubs` from the classes of the requests.
 from typing import Any, Generic, Literal, TypeVar
 
 import msgspec
@@ -37,6 +38,7 @@ Sent = TypeVar("Sent")
 
 OWN: tuple[type[Request], ...]
 METHODS: dict[str, type[Request]]
+EPISODE_METHODS: dict[str, type[EpisodeRequest]]
 
 def way_of(kind: type[Request]) -> str: ...
 def signature_of(kind: type[msgspec.Struct]) -> Any: ...
@@ -52,10 +54,13 @@ RESULTS = {"go": "AtRest", "ask": "Answered", "send": "Sent"}
 
 def acts_stub() -> str:
     """Return the content of ``client/acts.pyi``."""
-    named: set[type] = {Request}
+    named: set[type] = {Request, EpisodeRequest}
     methods = [
         request_method(name, kind, RESULTS[acts.way_of(kind)], named)
         for name, kind in acts.METHODS.items()
+    ]
+    about_episodes = [
+        request_method(name, kind, "int", named) for name, kind in acts.EPISODE_METHODS.items()
     ]
     modules: dict[str, list[str]] = {}
     for kind in sorted(named, key=lambda kind: kind.__name__):
@@ -63,27 +68,8 @@ def acts_stub() -> str:
     imports = "".join(
         f"from {module} import {', '.join(names)}\n" for module, names in sorted(modules.items())
     )
-    return ACTS_HEAD.format(imports=imports) + "\n".join(methods)
-
-
-EPISODES_HEAD = """\
-# Written by `python -m docs.stubs` from the classes of the requests about episodes.
-from typing import Literal
-
-from katana450.server.api.episode_requests import EpisodeRequest
-
-METHODS: dict[str, type[EpisodeRequest]]
-
-class EpisodeActs:
-"""
-
-
-def episodes_stub() -> str:
-    """Return the content of ``client/episode_acts.pyi``."""
-    methods = [
-        request_method(name, kind, "int", set()) for name, kind in episode_acts.METHODS.items()
-    ]
-    return EPISODES_HEAD + "\n".join(methods)
+    head = ACTS_HEAD.format(imports=imports)
+    return head + "\n".join(methods) + "\nclass EpisodeActs:\n" + "\n".join(about_episodes)
 
 
 def request_method(name: str, kind: type[msgspec.Struct], result: str, named: set[type]) -> str:
@@ -194,7 +180,6 @@ def value_types(schema: Schema) -> list[str]:
 
 STUBS: dict[Path, Callable[[], str]] = {
     PACKAGE / "client" / "acts.pyi": acts_stub,
-    PACKAGE / "client" / "episode_acts.pyi": episodes_stub,
     PACKAGE / "library" / "step_methods.pyi": steps_stub,
 }
 """Content of each file."""

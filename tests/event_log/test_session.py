@@ -16,7 +16,7 @@ from katana450.arm.control.lease import Role
 from katana450.assembly.event_log.record_maker import Record
 from katana450.cli.main import main
 from katana450.client import aconnect
-from katana450.client.asynchronous import AsyncClient
+from katana450.client.client import AsyncClient
 from katana450.server.api import answers
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.web.access_links import AccessFile

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from websockets.asyncio.server import ServerConnection, serve
 
-from katana450.client import AsyncClient, aconnect, asynchronous
+from katana450.client import AsyncClient, aconnect
+from katana450.client import client as clients
 from katana450.client.files import LostError
 from katana450.server.api import answers, requests
 
@@ -25,7 +26,7 @@ Act = Callable[[AsyncClient], Awaitable[None]]
 
 @pytest.fixture(autouse=True)
 def _short_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(asynchronous, "ANSWER_TIMEOUT", TIMEOUT)
+    monkeypatch.setattr(clients, "ANSWER_TIMEOUT", TIMEOUT)
 
 
 async def _ask(client: AsyncClient) -> None:

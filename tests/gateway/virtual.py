@@ -40,7 +40,7 @@ from katana450.assembly.page_routes import page_routes
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.cli.serve_options import add_serve_options
 from katana450.client import Client
-from katana450.client.asynchronous import AsyncClient
+from katana450.client.client import AsyncClient
 from katana450.client.files import RefusedError, Site
 from katana450.extension import load, provided
 from katana450.server.api import answers, requests

@@ -1,4 +1,4 @@
-"""The methods of the clients that make one act each, derived from the classes of the acts.
+"""The methods of the clients that make one request each, derived from the classes of these.
 
 ``acts.pyi`` beside this file has their signatures for editors and type checkers.
 """
@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import inspect
 from inspect import Parameter
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, get_args
 
 import msgspec
 
 from katana450.arm.control.commands.act import ENVELOPE, MotionRequest, Request, tag_of
 from katana450.server.api import requests
+from katana450.server.api.episode_requests import AnyEpisodeRequest
 
 AtRest, Answered, Sent = TypeVar("AtRest"), TypeVar("Answered"), TypeVar("Sent")
 
@@ -76,3 +77,15 @@ class Acts(Generic[AtRest, Answered, Sent]):
 
 for name, kind in METHODS.items():
     add_method(Acts, name, kind, way_of(kind))
+
+
+EPISODE_METHODS = {kind.__struct_config__.tag: kind for kind in get_args(AnyEpisodeRequest)}
+"""Class of the request of each method about episodes."""
+
+
+class EpisodeActs:
+    """One method for each request about episodes; it returns the number of the episode."""
+
+
+for name, kind in EPISODE_METHODS.items():
+    add_method(EpisodeActs, name, kind, "ask")

@@ -12,7 +12,7 @@ from urllib.parse import urlencode, urlsplit
 import msgspec
 
 from katana450.atomic import write_files, writer_of
-from katana450.client.episode_acts import EpisodeActs
+from katana450.client.acts import EpisodeActs
 from katana450.errors import KatanaError
 from katana450.server.api import answers
 from katana450.server.api.episode_requests import EpisodeRequest

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
 from katana450.client import Client, RefusedError, connect
-from katana450.client.asynchronous import PROGRESS_RATE, UNPLANNED_STATUSES, is_over
+from katana450.client.client import PROGRESS_RATE, UNPLANNED_STATUSES, is_over
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, InputError, KatanaError
 from katana450.extensions.programs.language.attached_files import without_scene
