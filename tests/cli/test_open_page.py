@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
@@ -11,8 +12,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from katana450.cli import open_page
-from katana450.cli.open_page import show_page
+from katana450.cli import serve
+from katana450.cli.serve import show_page
 from tests.browser.server import SIMULATION_APP, AppServer
 from tests.waiting import until
 
@@ -46,9 +47,9 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     for name in ("SSH_CONNECTION", "WSL_DISTRO_NAME", "WAYLAND_DISPLAY", "container", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("DISPLAY", ":0")
-    monkeypatch.setattr(open_page, "sys", system("linux"))
+    monkeypatch.setattr(serve, "sys", system("linux"))
     monkeypatch.setattr(Path, "exists", lambda _: False)
-    monkeypatch.setattr(open_page, "Thread", Now)
+    monkeypatch.setattr(threading, "Thread", Now)
     opened: list[str] = []
 
     def opens(url: str) -> bool:
@@ -64,7 +65,7 @@ def test_page_is_opened_at_a_screen(
 ) -> None:
     show_page(URL, 8080, 8081)
     monkeypatch.delenv("DISPLAY")
-    monkeypatch.setattr(open_page, "sys", system("darwin"))
+    monkeypatch.setattr(serve, "sys", system("darwin"))
     show_page(URL, 8080, 8081)
     assert opened == [URL, URL]
     assert capsys.readouterr().out == ""
@@ -97,7 +98,7 @@ def test_no_page_is_opened_where_no_person_would_see_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     if hindrance == "no terminal":
-        monkeypatch.setattr(open_page, "sys", system("linux", terminal=False))
+        monkeypatch.setattr(serve, "sys", system("linux", terminal=False))
     elif hindrance == "container":
         monkeypatch.setenv("container", "podman")
     else:

@@ -14,16 +14,14 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_items_pass_and_a_terminal_shows_their_fraction() -> None:
-    terminal = Terminal()
-    assert list(progress(range(4), 4, "Work", terminal)) == [0, 1, 2, 3]
-    assert terminal.getvalue() == "\rWork  25%\rWork 100%\n"
-
-
-def test_other_streams_get_nothing() -> None:
-    stream = io.StringIO()
+@pytest.mark.parametrize(
+    ("stream", "shown"), [(Terminal(), "\rWork  25%\rWork 100%\n"), (io.StringIO(), "")]
+)
+def test_items_pass_and_a_terminal_alone_shows_their_fraction(
+    stream: io.StringIO, shown: str
+) -> None:
     assert list(progress(range(4), 4, "Work", stream)) == [0, 1, 2, 3]
-    assert stream.getvalue() == ""
+    assert stream.getvalue() == shown
 
 
 def test_the_line_ends_when_the_work_breaks_off() -> None:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from pathlib import Path
@@ -23,11 +21,9 @@ from katana450.assembly.supervisor import (
     Supervisor,
     child_spec,
 )
-from katana450.cli import serve
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from katana450.extensions.recording.live import recorder
-from katana450.platform_support import claim_file
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.browser.server import ROOT, free_port
@@ -92,25 +88,6 @@ def test_end_amid_work_of_a_thread_lists_no_leaks(capfd: pytest.CaptureFixture[s
     assert process.exitcode == 0
     assert "It ends." in output.out
     assert "leaked" not in output.err
-
-
-def test_folder_of_a_killed_server_is_removed_at_the_next_start(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    killed, claimed = serve._private_folder()
-    (killed / "mesh").touch()
-    os.close(claimed)
-    other = tmp_path / "katana450-of-something-else"
-    other.mkdir()
-    running, claimed = serve._private_folder()
-    newest, also = serve._private_folder()
-    assert set(tmp_path.iterdir()) == {other, running, newest}
-    for folder in (claimed, also):
-        os.close(folder)
-    with (running / serve.CLAIM).open("r+b") as file:
-        claim_file(file.fileno())
-    shutil.rmtree(running)
 
 
 def test_server_that_ends_early_reports_no_lost_episodes(

@@ -1,4 +1,4 @@
-"""``katana450 serve``: open the ports, and supervise the processes of the server."""
+"""``katana450 serve``: open the ports and the page, and supervise the processes of the server."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import os
 import shutil
 import signal
 import socket
+import sys
 import tempfile
 import threading
+import webbrowser
 from argparse import Namespace
-from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -21,17 +22,9 @@ from katana450.assembly.frontend_process import OPEN, Sockets, log_folder, run_f
 from katana450.assembly.log_output import say, start_log
 from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import Supervisor, child_spec
-from katana450.cli.open_page import show_page
 from katana450.errors import ConfigurationError, KatanaError
 from katana450.extension import ExtraProcess, ServerFacts, load, results
-from katana450.platform_support import (
-    claim_file,
-    create_file,
-    only_this_user_writes,
-    open_bytes,
-    pipe_address,
-    stop_signals,
-)
+from katana450.platform_support import pipe_address, stop_signals
 from katana450.server.web.listen import LOOPBACK, listen, listen_beside, raise_descriptor_limit
 from katana450.settings import FIXED, Settings
 
@@ -43,9 +36,6 @@ ARM, FRONT_END, STOP = "katana450 arm", "katana450 front", "katana450 stop"
 RUN_ARM = "katana450.assembly.arm_process:run_arm"
 RUN_STOP = "katana450.assembly.stop_process:run_stop"
 """Functions of two of them, whose modules are imported there alone."""
-
-FOLDER_PREFIX, CLAIM = "katana450-", "claim"
-"""Begin of the name of a server's private folder, and the file in it that the server locks."""
 
 ARM_DEADLINE = 1.0
 """[s] Time without a tick of the control loop after which the arm's process is ended."""
@@ -134,7 +124,7 @@ class _Server:
         settings, stopping = self.settings, self.stopping
         port = self.sockets.pages.getsockname()[1]
         url = settings.public_url or local_url(settings, port)
-        folder, claimed = _private_folder()
+        folder = _private_folder()
         address = PrivateAddress(pipe_address(folder, "arm"), os.urandom(32))
         facts = ServerFacts(settings, options.urdf, options.tool, port, address, options, folder)
         front_end = partial(run_frontend, facts, self.sockets)
@@ -189,7 +179,6 @@ class _Server:
             return supervisor.robot
         finally:
             supervisor.stop()
-            os.close(claimed)
             shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -208,39 +197,14 @@ def _set_on_signals(stopping: threading.Event) -> None:
         signal.signal(number, stop)
 
 
-def _private_folder() -> tuple[Path, int]:
-    """Return a new folder that only this user can open, and the open file that claims it.
-
-    Removes the folders of servers that were killed. Raises ConfigurationError.
-    """
-    for claim in Path(tempfile.gettempdir()).glob(f"{FOLDER_PREFIX}*/{CLAIM}"):
-        _remove_unclaimed(claim)
+def _private_folder() -> Path:
+    """Return a new folder that only this user can open. Raises ConfigurationError."""
     try:
-        folder = Path(tempfile.mkdtemp(prefix=FOLDER_PREFIX))
-        claimed = create_file(folder / CLAIM, 0o600)
-        claim_file(claimed)
-        # Until now another server that starts leaves it alone.
-        os.write(claimed, b"claimed")
-        return folder, claimed
+        return Path(tempfile.mkdtemp(prefix="katana450-"))
     except OSError as error:
         raise ConfigurationError(
             f"No private folder can be created: {error}. Set TMPDIR to a writable folder."
         ) from error
-
-
-def _remove_unclaimed(claim: Path) -> None:
-    """Remove the folder of ``claim`` if it is this user's, and its server has ended."""
-    # The claim is held for as long as its server lives; then OSError is raised here.
-    with suppress(OSError):
-        if only_this_user_writes(claim.parent):
-            opened = open_bytes(claim, os.O_RDWR, 0o600)
-            try:
-                claim_file(opened)
-                unclaimed = os.fstat(opened).st_size > 0
-            finally:
-                os.close(opened)
-            if unclaimed:
-                shutil.rmtree(claim.parent)
 
 
 def local_url(settings: Settings, port: int) -> str:
@@ -254,3 +218,30 @@ def _shown(host: str) -> str:
     if host in ("0.0.0.0", "::", ""):
         return "127.0.0.1"
     return f"[{host}]" if ":" in host else host
+
+
+SCREENS = {"DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME"}
+"""Variables of which a Linux that can show a browser has one."""
+
+
+def show_page(url: str, *ports: int) -> None:
+    """Open ``url`` in a thread, or say how to open it from elsewhere through a tunnel of ``ports``.
+
+    A server that no person started, and one in a container, opens nothing unless BROWSER is set.
+    """
+    remote = "SSH_CONNECTION" in os.environ
+    if not os.environ.get("BROWSER"):
+        in_container = "container" in os.environ or Path("/.dockerenv").exists()
+        if in_container or not sys.stdout.isatty():
+            return
+        remote |= sys.platform == "linux" and not SCREENS & os.environ.keys()
+    if not remote:
+        threading.Thread(target=_open, args=(url,), daemon=True).start()
+    elif sys.stdout.isatty():
+        tunnel = " ".join(f"-L {port}:127.0.0.1:{port}" for port in ports)
+        say(f"No display here: run `ssh {tunnel} HOST` where there is one, and open {url} there.")
+
+
+def _open(url: str) -> None:
+    if not webbrowser.open(url):
+        say(f"No browser could be started. Open {url} in one yourself.")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from katana450.cli.arm_options import add_arm_options
-from katana450.cli.option_values import number, port
+from katana450.cli.option_values import add_arm_options, number, port
 from katana450.extension import provided
 from katana450.settings import Settings
 

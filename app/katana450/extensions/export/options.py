@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from katana450.cli.arm_options import add_arm_options
+from katana450.cli.option_values import add_arm_options
 from katana450.errors import InputError
 from katana450.extensions.export.formats import FORMATS, named
 

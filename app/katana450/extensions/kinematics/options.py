@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from katana450.cli.arm_options import add_arm_options
+from katana450.cli.option_values import add_arm_options
 
 FRAMES = ("shoulder", "base")
 
