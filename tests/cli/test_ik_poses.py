@@ -11,7 +11,6 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.cli.lines import ask
 
@@ -21,13 +20,12 @@ def random_postures(arm: MountedArm, count: int) -> FloatArray:
     return np.random.default_rng(450).uniform(chain.lower, chain.upper, (count, chain.n))
 
 
-def forms(T: FloatArray, decimals: int = 17) -> list[dict[str, Any]]:
-    """Return the pose ``T`` (4, 4) in every form, printed with ``decimals``."""
-    w, x, y, z = so3.to_quaternion(T[:3, :3]).round(decimals).tolist()
-    p = T[:3, 3].round(decimals).tolist()
-    rpy = np.round(so3.to_rpy(T[:3, :3]), decimals).tolist()
+def forms(T: FloatArray) -> list[dict[str, Any]]:
+    """Return the pose ``T`` (4, 4) in every form."""
+    w, x, y, z = so3.to_quaternion(T[:3, :3]).tolist()
+    p, rpy = T[:3, 3].tolist(), list(so3.to_rpy(T[:3, :3]))
     return [
-        {"T": T.round(decimals).tolist()},
+        {"T": T.tolist()},
         {"p": p, "wxyz": [w, x, y, z]},
         {"p": p, "xyzw": [x, y, z, w]},
         {"p": p, "rpy": rpy},
@@ -61,17 +59,6 @@ def test_pitch_and_roll_leave_the_yaw_to_the_arm(arm: MountedArm) -> None:
         assert same > 0
 
 
-@pytest.mark.cases(1)
-@pytest.mark.parametrize("decimals", [6, 4, 3])
-def test_printed_quaternions_are_taken_and_their_rounding_reported(
-    arm: MountedArm, decimals: int
-) -> None:
-    rounding = 0.5 * 10.0**-decimals
-    for q in random_postures(arm, 50):
-        for answer in ask("ik", forms(forward(arm.chain, q), decimals)[1:]):
-            assert answer["rotation_misfit"] <= 2.0 * rounding
-
-
 BAD = [
     ({"p": [0.3, 0.0, 0.1]}, "this has p"),
     ({"wxyz": [1, 0, 0, 0]}, "this has wxyz"),
@@ -94,20 +81,6 @@ def test_wrong_pose_is_refused_with_the_key_at_fault(
     assert expected in answer["error"]
 
 
-def test_nearest_is_that_of_the_projection(arm: MountedArm) -> None:
-    T = np.eye(4)
-    T[:3, 3] = (0.1, 0.3, 0.7)
-    request = {"T": T.tolist()}
-    (answer,) = ask("ik", [request], "--nearest")
-    expected = project(arm.chain, T)
-    nearest = answer["nearest"]
-    np.testing.assert_allclose(nearest["q"], expected.q, atol=1e-12)
-    assert nearest["position_mm"] == pytest.approx(1e3 * expected.position_error)
-    assert nearest["limits"] == [axis + 1 for axis in expected.limits]
-    assert nearest["branch"] == str(expected.branch)
-    assert nearest["reason"]
-
-
 def test_nearest_is_inside_the_limits_and_names_the_binding_one(arm: MountedArm) -> None:
     q = np.array(arm.chain.clamp(np.zeros(5)))
     q[4] = arm.chain.upper[4] + 0.1
@@ -119,19 +92,3 @@ def test_nearest_is_inside_the_limits_and_names_the_binding_one(arm: MountedArm)
     assert "axis 5 at its limit" in nearest["reason"]
     (plain,) = ask("ik", [{"T": T.tolist()}])
     assert "nearest" not in plain
-
-
-def test_units_of_people_are_asked_about(arm: MountedArm) -> None:
-    T = forward(arm.chain, np.array([0.2, -0.4, 0.6, 0.3, 0.1]))
-    T[:3, 3] *= 1e3
-    p = [0.3, 0.0, 0.1]
-    requests: list[dict[str, Any]] = [
-        {"T": T.tolist()},
-        {"p": T[:3, 3].tolist(), "wxyz": [1.0, 0.0, 0.0, 0.0]},
-        {"p": p, "rpy": [0.0, 45.0, 0.0]},
-        {"p": p, "pitch": 45.0, "roll": 0.0},
-        {"p": p, "pitch": 0.8, "roll": 0.0},
-    ]
-    units = ("metres", "metres", "radians", "radians")
-    for answer, unit in zip(ask("ik", requests), units, strict=False):
-        assert f"Did you mean {unit}?" in answer["error"]

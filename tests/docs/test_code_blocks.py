@@ -237,16 +237,12 @@ def test_requests_are_understood(block: CodeBlock) -> None:
         decoder.decoded(line)
 
 
-@pytest.mark.parametrize("block", code_blocks("toml"), ids=identifier)
-def test_toml_is_read(block: CodeBlock) -> None:
-    assert tomllib.loads(block.text)
-
-
 # Scripts are planned and run by the commands of docs/programs.md, see `folder`; the scene is loaded
 # by tests/exchange/test_scene_file.py.
-@pytest.mark.parametrize("block", code_blocks("yaml"), ids=identifier)
-def test_yaml_is_read(block: CodeBlock) -> None:
-    assert yaml.safe_load(block.text)
+@pytest.mark.parametrize("block", code_blocks("toml", "yaml"), ids=identifier)
+def test_toml_and_yaml_are_read(block: CodeBlock) -> None:
+    read = tomllib.loads if block.language == "toml" else yaml.safe_load
+    assert read(block.text)
 
 
 @pytest.mark.parametrize("block", code_blocks("csv"), ids=identifier)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.initial_camera import InitialCamera as Viewpoint
@@ -29,7 +28,6 @@ from katana450.extensions.media.picture import (
 )
 from katana450.extensions.media.report_pictures import tube
 from katana450.maths.geometry import se3
-from katana450.maths.water.surface import COLOUR
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, silhouette
@@ -64,12 +62,6 @@ def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Picture
     state = workshop.filled
     again = picture(workshop.stage.items(state), workshop.stage.water(state), NEAR)
     assert again.png == filled.png
-
-
-def test_water_has_its_colour_in_pictures(workshop: Workshop) -> None:
-    state = workshop.session.step(workshop.ready, [cmd.Fill(200.0)], 0.01)
-    (in_cup,) = workshop.stage.water(state)
-    assert in_cup.item.shape.material.colour == pytest.approx(np.array(COLOUR) / 255.0)
 
 
 @pytest.mark.parametrize("pose", POSES)

@@ -1,11 +1,9 @@
-"""Figures that the documents of the arm state: times of a stop, rates, the plant."""
+"""Figures that the documents of the arm state: times of a stop, and rates."""
 
 from __future__ import annotations
 
 import itertools
 import math
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,12 +13,9 @@ from hypothesis import strategies as st
 from katana450.arm.control.state.arm_report import ArmMode
 from katana450.extensions.real_arm.codec.requests import More, SendSplines
 from katana450.extensions.real_arm.driver.spline_motion import SplineStream
-from katana450.extensions.real_arm.plant.axis import KATANA450, STIFF
 from tests.conftest import LONG
 from tests.real_arm.paper_arm import JOINTS, MAP
 from tests.real_arm.test_programs_with_emulator import PERIOD, EmulatorOnPaper
-
-DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def moving(delay: float, seconds: float) -> tuple[EmulatorOnPaper, float, list[float]]:
@@ -87,41 +82,3 @@ def test_no_stream_of_setpoints_overflows_a_coefficient(
             numbers = np.frombuffer(packet.payload[1:73], ">i2").reshape(6, 6)
             assert (numbers[:, 1] == segment.end.position).all()
     assert count > 0 or t < 0.1
-
-
-def rows_of_plant() -> dict[str, tuple[str, str]]:
-    text = (DOCS / "arm-emulator.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| ([^|]+?) \| ([^|]+?) \| ([^|]+?) \| [^|]+ \|$", text, re.MULTILINE)
-    return {name: (one, other) for name, one, other in rows}
-
-
-def number(text: str) -> float:
-    number_match = re.match(r"[-\d.]+", text)
-    assert number_match, text
-    return float(number_match[0])
-
-
-@pytest.mark.parametrize(
-    ("row", "field", "factor"),
-    [
-        ("natural frequency of the position control", "bandwidth", 1.0),
-        ("damping ratio", "damping", 1.0),
-        ("delay", "delay", 1e3),
-        ("Coulomb friction", "coulomb", 1.0),
-        ("viscous friction", "viscous", 1.0),
-        ("droop of the stretched arm", "droop", math.degrees(1.0)),
-        ("backlash", "backlash", math.degrees(1.0)),
-        ("acceleration of an axis that falls", "fall", 1.0),
-        ("largest acceleration, as a multiple of the arm's limit", "reserve", 1.0),
-    ],
-)
-def test_table_of_the_plant_has_its_numbers(row: str, field: str, factor: float) -> None:
-    for text, profile in zip(rows_of_plant()[row], (KATANA450, STIFF), strict=True):
-        assert number(text) == pytest.approx(factor * getattr(profile, field)), (row, text)
-
-
-def test_friction_of_the_plant_leaves_an_axis_within_the_stated_angle() -> None:
-    stated = re.search(r"within ([\d.]+)° of its setpoint", (DOCS / "arm-emulator.md").read_text())
-    assert stated
-    left = math.degrees(KATANA450.coulomb / KATANA450.bandwidth**2)
-    assert left == pytest.approx(float(stated[1]), abs=5e-4)

@@ -16,9 +16,6 @@ from katana450.extensions.programs.run.measured_run import Deviation, MeasuredRu
 from katana450.extensions.programs.run.simulation import Simulation
 from katana450.maths.geometry.arrays import FloatArray
 
-GAP = 0.3
-"""[s] Time between two measurements above which a line is broken."""
-
 RIGHT: dict[str, Any] = {"ha": "right", "va": "top"}
 """Alignment of a text in the upper right corner."""
 
@@ -107,9 +104,9 @@ def _draw_distances(panel: Any, deviations: tuple[Deviation, ...]) -> None:
     measured = commanded = 0.0
     for deviation in deviations:
         off = 1e3 * deviation.error
-        panel.plot(*_broken(deviation.t, off), color=ERROR, linewidth=1.0)
-        sent = _broken(deviation.t_commanded, 1e3 * deviation.commanded)
-        panel.plot(*sent, color=AXES[0], linewidth=1.6)
+        panel.plot(deviation.t, off, color=ERROR, linewidth=1.0)
+        sent = 1e3 * deviation.commanded
+        panel.plot(deviation.t_commanded, sent, color=AXES[0], linewidth=1.6)
         measured = max(measured, float(off.max()))
         commanded = max(commanded, 1e3 * float(deviation.commanded.max()))
     panel.set_title("Distance from the path")
@@ -120,12 +117,6 @@ def _draw_distances(panel: Any, deviations: tuple[Deviation, ...]) -> None:
         (f"setpoints: up to {commanded:.1g} mm", AXES[0], 0.88),
     ):
         panel.text(0.99, y, text, transform=panel.transAxes, color=colour, fontsize=8.0, **RIGHT)
-
-
-def _broken(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the points of a line that is broken while the arm is on another path."""
-    gaps = np.flatnonzero(np.diff(t) > GAP) + 1
-    return np.insert(t, gaps, math.nan), np.insert(values, gaps, math.nan)
 
 
 def _draw_joint_errors(panel: Any, run: MeasuredRun) -> None:
