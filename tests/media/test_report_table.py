@@ -1,4 +1,4 @@
-"""Test the table of a report: all digits, the water, and its use as a motion."""
+"""Test the table of a report and its figures: all digits, the water, its use as a motion."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.export.playback import load_motion
 from katana450.extensions.media import figures
-from katana450.extensions.media.measures import PourRecord
+from katana450.extensions.media.measures import PathTrace, PourRecord
 from katana450.extensions.media.report import Report
 from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
@@ -129,3 +129,18 @@ def test_broken_table_is_refused_with_its_row(run: tuple[Planned, Report], tmp_p
     with pytest.raises(InputError, match=r"Row 3 of .*much"):
         load_motion(path, plan.robot)
     assert math.isfinite(report.run.t[-1])
+
+
+def test_the_drawn_error_is_the_largest_of_every_part_of_every_path() -> None:
+    rng = np.random.default_rng(3)
+    sigma = np.linspace(0.0, 1.0, 2001)
+    off = rng.normal(size=(3, 2001, 3))
+    still = np.zeros((2001, 3))
+    paths = [PathTrace("line", sigma, still, error, np.zeros(2001)) for error in off]
+    middles, drawn = figures.largest(paths)
+    errors = np.linalg.norm(off, axis=2).max(axis=0)
+    half = 0.5 / figures.PARTS
+    for middle, most in zip(middles, drawn, strict=True):
+        near = np.abs(sigma - middle)
+        assert errors[near < half - 1e-9].max() <= most <= errors[near < half + 1e-9].max()
+    assert drawn.max() == errors.max()
