@@ -124,7 +124,7 @@ PAIRS: list[tuple[requests.ArmRequest, replies.ArmReply]] = [
     (requests.ErrorQuery(), replies.FirmwareError(ord("H"), -1, 1, "move buffer error")),
 ]
 
-REFUSAL = reply_bytes(replies.Refused())
+REFUSAL = reply_bytes(replies.RefusedReply())
 
 
 def test_checksum_has_its_published_check_value() -> None:
@@ -162,7 +162,7 @@ def test_error_is_flagged_then_fetched_by_four_raw_bytes() -> None:
     host, arm = HostCodec(), FirmwareCodec()
     packet = requests.SendSplines((HOLD,) * 6, requests.More.LAST)
     arm.receive(host.send(packet))
-    assert host.receive(REFUSAL) == replies.Refused()
+    assert host.receive(REFUSAL) == replies.RefusedReply()
     query = host.send(requests.ErrorQuery())
     assert query == bytes.fromhex("00 00 00 C1")
     assert arm.receive(query) == [requests.ErrorQuery()]
@@ -243,7 +243,7 @@ def test_request_reply_and_refusal_are_read_at_every_split(
     for data, read, event in (
         (request_bytes(request_), firmware_events, request_),
         (reply_bytes(reply), read_reply, reply),
-        (REFUSAL, read_reply, replies.Refused()),
+        (REFUSAL, read_reply, replies.RefusedReply()),
     ):
         for cut in range(len(data) + 1):
             assert read([data[:cut], data[cut:]]) == [event]

@@ -14,7 +14,7 @@ from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.errors import InputError
 from katana450.extensions.real_arm.codec import requests
 from katana450.extensions.real_arm.codec.codecs import reply_bytes
-from katana450.extensions.real_arm.codec.replies import FirmwareError, Refused
+from katana450.extensions.real_arm.codec.replies import FirmwareError, RefusedReply
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.driver.machine import ArmMachine
 from katana450.extensions.real_arm.link import ArmUrl
@@ -40,7 +40,7 @@ class PaperServer:
             return self.faults.pop(0)
         if isinstance(reply, FirmwareError):
             self._refused = reply
-            return (reply_bytes(Refused()),)
+            return (reply_bytes(RefusedReply()),)
         return (self.delay, reply_bytes(reply)) if self.delay else (reply_bytes(reply),)
 
 

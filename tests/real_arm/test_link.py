@@ -50,7 +50,7 @@ def test_reply_in_pieces_is_complete() -> None:
 
 
 def test_refusal_comes_with_its_reason_and_the_link_remains() -> None:
-    with link_to(reply_bytes(replies.Refused())) as (link, firmware):
+    with link_to(reply_bytes(replies.RefusedReply())) as (link, firmware):
         for _ in range(2):
             with pytest.raises(ArmRefusalError, match=r"axis 2\): the axis collided") as refused:
                 link.exchange(requests.ReadPositions())

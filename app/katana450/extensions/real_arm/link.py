@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 from katana450.errors import ConfigurationError, InputError, KatanaError
 from katana450.extensions.real_arm.codec.codecs import HostCodec, OutOfStepError
-from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError, Refused
+from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError, RefusedReply
 from katana450.extensions.real_arm.codec.requests import ArmRequest, ErrorQuery
 from katana450.extensions.serial_port import SerialPort
 
@@ -259,7 +259,7 @@ class ArmLink:
             InputError: A number does not fit into the request. Nothing was sent.
         """
         reply = self._reply_to(request, timeout)
-        if isinstance(reply, Refused):
+        if isinstance(reply, RefusedReply):
             reason = self._reply_to(ErrorQuery(), timeout)
             if isinstance(reason, FirmwareError):
                 raise ArmRefusalError(reason)

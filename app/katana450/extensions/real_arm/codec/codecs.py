@@ -10,7 +10,7 @@ from katana450.extensions.real_arm.codec.replies import (
     INVALID_ARGUMENT,
     ArmReply,
     FirmwareError,
-    Refused,
+    RefusedReply,
 )
 from katana450.extensions.real_arm.codec.requests import ArmRequest, ErrorQuery, read_request
 
@@ -101,8 +101,8 @@ class HostCodec:
         request = self._request
         if request is None:
             raise self._out_of_step("no request waits")
-        if self._buffer[:1] == Refused.HEAD:
-            return self._complete(Refused, Refused.length())
+        if self._buffer[:1] == RefusedReply.HEAD:
+            return self._complete(RefusedReply, RefusedReply.length())
         if self._buffer[0] != request.REPLY.HEAD[0]:
             raise self._out_of_step(f"a reply to {type(request).__name__} begins otherwise")
         if isinstance(request, ErrorQuery):

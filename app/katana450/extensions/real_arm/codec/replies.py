@@ -174,7 +174,7 @@ class ArmReply(WireMessage, frozen=True):
     """Base of all replies."""
 
 
-class Refused(ArmReply, frozen=True):
+class RefusedReply(ArmReply, frozen=True):
     """Answer to any request that the arm refuses; its reason is fetched by ErrorQuery."""
 
     HEAD = b"\xc0"

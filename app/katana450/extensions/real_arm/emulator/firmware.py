@@ -100,7 +100,7 @@ class Firmware:
     def _refuse(self, payload: bytes, refusal: RequestError) -> bytes:
         command = payload[0] if payload else 0
         self._error = replies.FirmwareError(command, refusal.code, refusal.axis, refusal.text)
-        return reply_bytes(replies.Refused())
+        return reply_bytes(replies.RefusedReply())
 
     def _axis(self, number: int) -> EmulatedAxis:
         if not 1 <= number <= len(self.arm.axes):
