@@ -1,10 +1,10 @@
 // The text of a script, with the numbers of its lines and what the server says about them.
 import { button, html } from "../instruments/shape.js";
 
-/** @typedef {{ line: number, text: string, file?: string }} Problem */
+/** @typedef {{ line: number, text: string }} Problem */
 /** @typedef {{ problems: Problem[], taught: import("./poses.js").Taught | null }} Reading */
 const AFTER = 400; // ms without typing after which the text is checked
-const PLACE = /^(?:(.+), )?line (\d+), column \d+: (.*)$/;
+const PLACE = /^line (\d+), column \d+: (.*)$/;
 
 export class Editor {
   element = html("div", { id: "teach-editor" });
@@ -55,15 +55,14 @@ export class Editor {
     return reading;
   }
 
-  /** Show `problems`: {line, text, file} each; `file` names the scene file of the script. @param {Problem[]} problems */
+  /** Show `problems`: {line, text} each. @param {Problem[]} problems */
   explain(problems) {
-    const lines = new Set(problems.filter(({ file }) => !file).map(({ line }) => line));
+    const lines = new Set(problems.map(({ line }) => line));
     [...this.#numbers.children].forEach((row, i) => row.classList.toggle("bad", lines.has(i + 1)));
     this.#problems.replaceChildren(
-      ...problems.map(({ line, text, file }) => {
-        if (file) return html("li", {}, html("b", {}, `${file}, line ${line}`), ` ${text}`);
-        return html("li", {}, button([html("b", {}, `Line ${line}`), ` ${text}`], () => this.#select(line)));
-      }),
+      ...problems.map(({ line, text }) =>
+        html("li", {}, button([html("b", {}, `Line ${line}`), ` ${text}`], () => this.#select(line))),
+      ),
     );
   }
 
@@ -82,13 +81,13 @@ export class Editor {
   }
 }
 
-/** Return the problems that an error of a program names, with file and line. @param {string} why */
+/** Return the problems that an error of a program names, with their lines. @param {string} why */
 export function problemsOf(why) {
   /** @type {Problem[]} */
   const problems = [];
   for (const row of why.split("\n")) {
     const place = PLACE.exec(row);
-    if (place) problems.push({ file: place[1] ?? "", line: Number(place[2]), text: place[3] });
+    if (place) problems.push({ line: Number(place[1]), text: place[2] });
   }
   return problems;
 }

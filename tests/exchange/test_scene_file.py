@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import textwrap
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -163,16 +164,14 @@ def test_a_scene_is_read_back_with_its_meshes(mesh: Mesh, kind: str, tmp_path: P
 
 def test_scene_of_a_script_is_read_with_its_meshes(mesh: Mesh, tmp_path: Path) -> None:
     script = tmp_path / "script.yaml"
-    zipfile.ZipFile(io.BytesIO(scene_zip(scene_of(mesh), T_PALM_TOOL))).extractall(tmp_path / "a")
-    script.write_text("scene: a/scene.yaml\nsteps: [home]\n", encoding="utf-8")
+    zipfile.ZipFile(io.BytesIO(scene_zip(scene_of(mesh), T_PALM_TOOL))).extractall(tmp_path)
+    scene = textwrap.indent((tmp_path / "scene.yaml").read_text("utf-8"), "  ")
+    script.write_text(f"scene:\n{scene}\nsteps: [home]\n", encoding="utf-8")
     back = read_scene_folder(script, T_PALM_TOOL)
     assert [scene_object.name for scene_object in back.scene.objects] == ["ring", "camera"]
     assert back.meshes[0].key == mesh.key
     script.write_text("steps: [home]\n", encoding="utf-8")
     with pytest.raises(InputError, match="a script without a `scene`"):
-        read_scene_folder(script, T_PALM_TOOL)
-    script.write_text("scene: a/b.yaml\nsteps: [home]\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"line 1, column 8: .*b\.yaml cannot be read"):
         read_scene_folder(script, T_PALM_TOOL)
 
 

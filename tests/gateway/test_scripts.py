@@ -115,28 +115,11 @@ def test_schema_is_served_to_editors(server: VirtualServer) -> None:
     assert json.loads(body) == script_schema()
 
 
-def test_script_of_the_folder_is_returned_with_its_files(
-    server: VirtualServer, folder: Path
-) -> None:
-    (folder / "scenes").mkdir()
-    (folder / "scenes" / "none.yaml").write_text("scene: 1\nobjects: []", encoding="utf-8")
-    text = "scene: scenes/none.yaml\nsteps:\n  - wait: 2\n"
-    (folder / "waiting.yaml").write_text(text, encoding="utf-8")
-    whole = server.ask("/api/v1/scripts/waiting")[2].decode()
-    assert read(server, whole)["problems"] == []
-    # A text that is sent stands alone: its files are not looked up in the folder.
-    problem, *_ = read(server, text)["problems"]
-    assert (problem["line"], problem["file"]) == (1, "")
-    assert "stands alone" in problem["text"]
-    (problem,) = read(server, whole.replace("objects:", "object:"))["problems"]
-    assert (problem["line"], problem["file"]) == (2, "scenes/none.yaml")
-
-
 @pytest.mark.parametrize(
     ("moved", "status", "why"),
     [
         (0.0, "ready", ""),
-        (5.0, "refused", "line 1, column 8: The scene is not that of the script: cup is at"),
+        (5.0, "refused", "line 1, column 8: The scene is not that of the script: cup is elsewhere"),
     ],
 )
 def test_server_checks_the_scene_of_a_script(

@@ -199,8 +199,7 @@ def of_script(name: str, urdf: Path) -> Playback:
         plan = plan_script(parse(script_text(own if own.exists() else Path(name))), urdf)
     except ScriptError as error:
         problem = error.problems[0]
-        file = str(Path(name).parent / problem.file) if problem.file else name
-        raise InputError(f"{file}:{problem.line}:{problem.column}: {problem.text}") from error
+        raise InputError(f"{name}:{problem.line}:{problem.column}: {problem.text}") from error
     states = run_by_clock(plan).states
     return Playback(plan.robot, plan.session, states, Settings().rate, plan.script.bare)
 

@@ -39,7 +39,7 @@ class Program(Request, frozen=True, kw_only=True):
     line. The last plan is kept: the same script is ready at once while posture, gripper, tool,
     scene and water are the same.
 
-    The text stands alone: it holds the texts of the files that it names. A script with a ``scene``
+    A script with a ``scene``
     is refused unless that is the present one.
     """
 

@@ -29,10 +29,8 @@ from katana450.extensions.importers.archive import (
 )
 from katana450.extensions.importers.formats.mesh_file import read_mesh
 from katana450.extensions.importers.formats.shape_file import Format, Up
-from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import MAX_BYTES, Problem, ScriptError
 from katana450.extensions.programs.script.script import is_script, parse
-from katana450.extensions.programs.script.script_files import files_in
 from katana450.extensions.programs.script.script_scene import (
     VERSION,
     MeshFile,
@@ -202,15 +200,10 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
         text = _text(bytes_of(path, MAX_BYTES), path.name)
         if not is_script(text):
             return _stored(parsed(text), opened, T_palm_tool)
-        scene = parse(attached(text, files_in(folder))).scene
+        scene = parse(text).scene
         if scene is None:
             raise InputError(f"{path}: This is a script without a `scene`.")
-        below = PurePosixPath(scene.file).parent
-
-        def opened_beside(name: str, maximum: int) -> bytes:
-            return opened(str(below / name), maximum)
-
-        return _stored(scene.draft, opened_beside, T_palm_tool)
+        return _stored(scene, opened, T_palm_tool)
     except ScriptError as error:
         raise InputError(f"{path}:\n{error}") from error
 

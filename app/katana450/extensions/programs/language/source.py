@@ -59,28 +59,21 @@ MISPLACED = {
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem at one place of the text; line and column count from 1.
-
-    ``file``: name of the file that the script names and in which it is; "" for the script itself.
-    """
+    """A problem at one place of the text; line and column count from 1."""
 
     line: int
     column: int
     text: str
-    file: str = ""
 
     def __str__(self) -> str:
-        file = f"{self.file}, " if self.file else ""
-        return f"{file}line {self.line}, column {self.column}: {self.text}"
+        return f"line {self.line}, column {self.column}: {self.text}"
 
 
 class ScriptError(InputError):
-    """A script that cannot be run, with all its problems in the order of their files and lines."""
+    """A script that cannot be run, with all its problems in the order of their lines."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
-        self.problems = tuple(
-            sorted(problems, key=lambda mistake: (mistake.file, mistake.line, mistake.column))
-        )
+        self.problems = tuple(sorted(problems, key=lambda problem: (problem.line, problem.column)))
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
 
@@ -96,7 +89,6 @@ class YamlValue:
         number: the number that the text stands for; None if it stands for none.
         unit: kind of quantity of the number, see ``expression.Quantity``.
         why: why a text is not an expression with a value; empty if that was not tried.
-        file: name of the file that the script names and in which it is; "" for the script itself.
     """
 
     line: int
@@ -106,7 +98,6 @@ class YamlValue:
     number: float | None = None
     unit: str = PLAIN
     why: str = ""
-    file: str = ""
 
     @property
     def items(self) -> tuple[YamlValue, ...]:
@@ -122,7 +113,7 @@ class YamlValue:
 
     def wrong(self, problem: str) -> ScriptError:
         """Return the error ``problem`` for the place of this value."""
-        return ScriptError((Problem(self.line, self.column, problem, self.file),))
+        return ScriptError((Problem(self.line, self.column, problem),))
 
     def __str__(self) -> str:
         return {"nothing": "nothing", "list": "a list", "mapping": "a mapping"}.get(
@@ -130,33 +121,25 @@ class YamlValue:
         )
 
 
-def read(text: str, what: str = "script", file: str = "") -> YamlValue:
+def read(text: str, what: str = "script") -> YamlValue:
     """Return ``text`` as one value. Raises ScriptError with the place of an error.
 
-    ``what`` names the text in messages, and ``file`` is the name of its file; "" for the script.
+    ``what`` names the text in messages.
     """
     if len(text.encode("utf-8", "replace")) > MAX_BYTES:
-        raise ScriptError((Problem(1, 1, f"A {what} has at most {MAX_BYTES // 1024} KB.", file),))
-    node = composed(text, what, file)
-    if node is None:
-        raise ScriptError((Problem(1, 1, f"The {what} is empty.", file),))
-    return _value(node, file)
-
-
-def composed(text: str, what: str, file: str) -> yaml.Node | None:
-    """Return the node of ``text``, which has the places of all values; None for an empty text.
-
-    Raises ScriptError, as ``read`` does.
-    """
+        raise ScriptError((Problem(1, 1, f"A {what} has at most {MAX_BYTES // 1024} KB."),))
     try:
         # The events are checked first: composing recurses, and resolves anchors.
-        _check_bounds(text, what, file)
-        return yaml.compose(text, Loader=yaml.SafeLoader)
+        _check_bounds(text, what)
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError as error:
-        raise ScriptError((Problem(*_explained(error, text), file),)) from error
+        raise ScriptError((Problem(*_explained(error, text)),)) from error
+    if node is None:
+        raise ScriptError((Problem(1, 1, f"The {what} is empty."),))
+    return _value(node)
 
 
-def _check_bounds(text: str, what: str, file: str) -> None:
+def _check_bounds(text: str, what: str) -> None:
     depth = 0
     for count, event in enumerate(yaml.parse(text, Loader=yaml.SafeLoader)):
         problem = ""
@@ -173,26 +156,25 @@ def _check_bounds(text: str, what: str, file: str) -> None:
         elif count > MAX_VALUES:
             problem = f"A {what} holds at most {MAX_VALUES} values."
         if problem:
-            raise ScriptError((Problem(*_place(event.start_mark), problem, file),))
+            raise ScriptError((Problem(*_place(event.start_mark), problem),))
 
 
 def _place(mark: Any) -> tuple[int, int]:
     return mark.line + 1, mark.column + 1
 
 
-def _value(node: yaml.Node, file: str) -> YamlValue:
+def _value(node: yaml.Node) -> YamlValue:
     line, column = _place(node.start_mark)
     if isinstance(node, yaml.MappingNode):
-        fields = tuple((_value(key, file), _value(value, file)) for key, value in node.value)
-        return YamlValue(line, column, fields, "mapping", file=file)
+        fields = tuple((_value(key), _value(value)) for key, value in node.value)
+        return YamlValue(line, column, fields, "mapping")
     if isinstance(node, yaml.SequenceNode):
-        items = tuple(_value(item, file) for item in node.value)
-        return YamlValue(line, column, items, "list", file=file)
+        return YamlValue(line, column, tuple(map(_value, node.value)), "list")
     if node.tag == NULL:
-        return YamlValue(line, column, None, "nothing", file=file)
+        return YamlValue(line, column, None, "nothing")
     kind = {TEXT: "text", WHOLE: "whole", REAL: "number"}.get(node.tag, "other")
     text = str(node.value)
-    return YamlValue(line, column, text, kind, _number(text), file=file)
+    return YamlValue(line, column, text, kind, _number(text))
 
 
 def _number(text: str) -> float | None:

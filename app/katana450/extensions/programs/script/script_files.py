@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from katana450.arm.control.arm import ArmModel
 from katana450.atomic import bytes_of, write_files, writer_of
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions import programs
-from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import MAX_BYTES
 from katana450.extensions.programs.script.script import parse
 
@@ -64,10 +63,7 @@ class Scripts:
         )
 
     def text(self, name: str) -> str:
-        """Return the text of the script ``name``, with that of the scene file that it names.
-
-        That file is in the folder of the script or below. Raises InputError if one cannot be read.
-        """
+        """Return the text of the script ``name``. Raises InputError if it cannot be read."""
         path = self.paths.get(name)
         if path is None:
             raise InputError(f"The script {name!r} no longer exists.")
@@ -102,36 +98,12 @@ def file_name(name: str) -> str:
     return f"{name}{ENDING}"
 
 
-def _text_of(path: Path) -> str:
+def script_text(path: Path) -> str:
     """Return the text of a script file. Raises InputError if it cannot be read."""
     try:
         return bytes_of(path, MAX_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8 text: {error.reason}.") from error
-
-
-def script_text(path: Path) -> str:
-    """Return the text of a script file, with that of the scene file that it names.
-
-    Lines keep their numbers. Raises InputError if a file cannot be read.
-    """
-    return attached(_text_of(path), files_in(path.parent))
-
-
-def files_in(folder: Path) -> Callable[[str], str]:
-    """Return a function that returns the text of a file in ``folder`` or below, by its name.
-
-    It raises InputError for a file that cannot be read, or that a link leads out of the folder.
-    """
-    root = folder.resolve()
-
-    def opened(name: str) -> str:
-        path = (root / name).resolve()
-        if not path.is_relative_to(root):
-            raise InputError(f"{name} is not in the folder of the script.")
-        return _text_of(path)
-
-    return opened
 
 
 def _shown(path: Path) -> str:

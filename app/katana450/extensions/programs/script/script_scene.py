@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -26,7 +27,6 @@ from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_state import require_turning
 from katana450.extensions.programs.language import kinds
-from katana450.extensions.programs.language.attached_files import attached_file, is_file_name
 from katana450.extensions.programs.language.declaration import ALONE, Declared, Kind, record
 from katana450.extensions.programs.language.kinds import (
     TEXT,
@@ -228,11 +228,13 @@ OBJECTS = Kind(_entries, ENTRIES.schema).about("The objects")
 class SceneDraft(Declared):
     """A scene as in a scene file.
 
-    Its mesh files are not read yet. The values are as in ``Scene``.
+    Its mesh files are not read yet. The values are as in ``Scene``, and ``source`` is its place in
+    the text.
     """
 
     noun = "a scene"
 
+    source: YamlValue
     version: Annotated[float, number(1, 1000, about="Version of the format").named("scene")] = (
         VERSION
     )
@@ -287,13 +289,60 @@ class SceneDraft(Declared):
         joints = None if self.joints is None else np.array(self.joints)
         return Scene(tuple(objects), self.water, joints)
 
+    def begin(self, session: Session) -> State:
+        """Return the state of an arm at rest in the scene. Raises InputError for a mesh.
 
-def parsed(source: str, file: str = "") -> SceneDraft:
-    """Return the text of a scene file as a draft. Raises ScriptError with all its mistakes.
+        The meshes of a scene are files, which are read by ``katana450 run``.
+        """
+        for entry in self.entries:
+            if entry.mesh is not None:
+                raise entry.source.wrong(
+                    f"{entry.name} is a mesh, whose file is not read here. Use `katana450 run`."
+                )
+        scene = self.scene({}, _T_palm_tool(session))
+        try:
+            return begun(session, scene)
+        except ScriptError:
+            raise
+        except InputError as error:
+            raise self.source.wrong(str(error)) from error
 
-    ``file`` is the name of the file, if a script names it.
-    """
-    value = read(source, "scene", file)
+    def check_present(self, session: Session, state: State) -> None:
+        """Raise ScriptError with the first difference if ``state`` is not in this scene.
+
+        The forms of meshes are not compared.
+        """
+        if difference := self._difference(session, state):
+            raise self.source.wrong(
+                f"The scene is not that of the script: {difference}. Load the "
+                "scene on the page, start the server with it, or simulate the script alone. "
+                "Without `scene` it runs in any."
+            )
+
+    def _difference(self, session: Session, state: State) -> str:
+        """Return a clause that names the first difference of ``state`` from this scene."""
+        present = {scene_object.name: scene_object for scene_object in state.objects}
+        T_palm_tool = _T_palm_tool(session)
+        for entry in self.entries:
+            if entry.name not in present:
+                return f"there is no {entry.name}"
+            difference = _object_difference(entry, present[entry.name], T_palm_tool)
+            if difference:
+                return difference
+        expected = {entry.name for entry in self.entries}
+        for name in present:
+            if name not in expected:
+                return f"there is also {name}"
+        wanted, poured = (self.water or 0.0) / ML, state.poured
+        cup = 0.0 if poured is None else poured.water.cup.kept / MILLILITRE
+        if abs(wanted - cup) > SAME_VOLUME:
+            return f"the cup has {cup:.1f} ml of water, not {wanted:.1f} ml of water"
+        return ""
+
+
+def parsed(source: str) -> SceneDraft:
+    """Return the text of a scene file as a draft. Raises ScriptError with all its mistakes."""
+    value = read(source, "scene")
     if value.kind == "mapping" and all(name.held != "scene" for name, _ in value.fields):
         raise value.wrong("A scene needs 'scene', the version of its format.")
     return SceneDraft.read(value, ALONE)
@@ -309,97 +358,26 @@ SAME_VOLUME = 0.1
 """[ml] Difference up to which the cup has the water that a script expects."""
 
 
-@dataclass(frozen=True, eq=False)
-class ScriptScene:
-    """The scene of a script.
-
-    Attributes:
-        at: its place in the script.
-        draft: the scene, without its meshes.
-        file: name of its file in the folder of the script; "" if the script has it inline.
-    """
-
-    at: YamlValue
-    draft: SceneDraft
-    file: str = ""
-
-    def begin(self, session: Session) -> State:
-        """Return the state of an arm at rest in the scene. Raises InputError for a mesh.
-
-        The meshes of a scene are files, which are read by ``katana450 run``.
-        """
-        for entry in self.draft.entries:
-            if entry.mesh is not None:
-                raise entry.source.wrong(
-                    f"{entry.name} is a mesh, whose file is not read here. Use `katana450 run`."
-                )
-        scene = self.draft.scene({}, _T_palm_tool(session))
-        try:
-            return begun(session, scene)
-        except ScriptError:
-            raise
-        except InputError as error:
-            raise self.at.wrong(str(error)) from error
-
-    def check_present(self, session: Session, state: State) -> None:
-        """Raise ScriptError with the first difference if ``state`` is not in this scene.
-
-        The forms of meshes are not compared.
-        """
-        if difference := self._difference(session, state):
-            raise self.at.wrong(
-                f"The scene is not that of the script: {difference}. Load the "
-                "scene on the page, start the server with it, or simulate the script alone. "
-                "Without `scene` it runs in any."
-            )
-
-    def _difference(self, session: Session, state: State) -> str:
-        """Return a clause that names the first difference of ``state`` from this scene."""
-        present = {scene_object.name: scene_object for scene_object in state.objects}
-        T_palm_tool = _T_palm_tool(session)
-        for entry in self.draft.entries:
-            if entry.name not in present:
-                return f"there is no {entry.name}"
-            difference = _object_difference(entry, present[entry.name], T_palm_tool)
-            if difference:
-                return difference
-        expected = {entry.name for entry in self.draft.entries}
-        for name in present:
-            if name not in expected:
-                return f"there is also {name}"
-        wanted, poured = (self.draft.water or 0.0) / ML, state.poured
-        cup = 0.0 if poured is None else poured.water.cup.kept / MILLILITRE
-        if abs(wanted - cup) > SAME_VOLUME:
-            return f"the cup has {cup:.1f} ml of water, not {wanted:.1f} ml of water"
-        return ""
-
-
-def _scene(value: YamlValue, context: ScriptContext) -> ScriptScene | None:
-    """Read the name of a file, a list of objects, or a mapping like that of a scene file."""
+def _scene(value: YamlValue, context: ScriptContext) -> SceneDraft | None:
+    """Read a list of objects, or a mapping like that of a scene file."""
     if value.kind == "nothing":
         return None
     if value.kind == "list":
-        return ScriptScene(value, SceneDraft(entries=bound(OBJECTS)(value, context)))
-    if value.kind == "mapping" and not any(is_file_name(name) for name, _ in value.fields):
-        return ScriptScene(value, bound(record(SceneDraft))(value, context))
-    file = attached_file(value)
-    return ScriptScene(value, parsed(file.text, file.name), file.name)
+        return SceneDraft(value, entries=bound(OBJECTS)(value, context))
+    if value.kind == "text":
+        raise value.wrong(
+            f"A script has its objects itself. Copy them from {value} to here, or leave `scene` "
+            "out and run it with `--scene` and the file."
+        )
+    return bound(record(SceneDraft))(value, context)
 
 
 SCENE = Kind(
     _scene,
     any_of(
-        "The scene that the script needs: a file in its folder, or the objects",
-        TEXT.schema,
+        "The scene that the script needs: the objects, or a scene as in a scene file",
         OBJECTS.schema,
         SceneDraft.schema(),
-        {
-            "description": "A file, with its text",
-            "type": "object",
-            "patternProperties": {r"\.ya?ml$": TEXT.schema},
-            "additionalProperties": False,
-            "minProperties": 1,
-        },
         {"type": "null"},
     ),
 )
@@ -435,27 +413,20 @@ def _object_difference(
 ) -> str:
     """Return a clause that names how ``present`` differs from ``entry``; "" for not at all."""
     same_size = entry.shape is Shape.MESH or np.allclose(entry.size, present.size, rtol=1e-6)
-    if entry.shape is not present.shape or not same_size:
-        return f"{entry.name} has another shape or size"
-    if abs(entry.scale - present.scale) > 1e-6 * entry.scale:
-        return f"{entry.name} has the scale {present.scale:g}, not {entry.scale:g}"
+    same_scale = math.isclose(entry.scale, present.scale, rel_tol=1e-6)
+    if entry.shape is not present.shape or not (same_size and same_scale):
+        return f"{entry.name} has another shape, size or scale"
     if present.held or entry.fixed is not present.fixed:
         return f"{entry.name} is {'' if present.carried else 'not '}in the hand"
-    if entry.can_be_held is not present.can_be_held:
-        return f"{entry.name} can{'' if present.can_be_held else 'not'} be held"
-    if entry.zone_name != present.zone.value:
-        return f"{entry.name} has the zone {present.zone.value}, not {entry.zone_name}"
+    if (entry.can_be_held, entry.zone_name) != (present.can_be_held, present.zone.value):
+        return f"{entry.name} has another `can_be_held` or `zone`"
     T = entry.T if T_palm_tool is None or not entry.fixed else T_palm_tool @ entry.T
     if float(np.linalg.norm(T[:3, 3] - present.T[:3, 3])) > SAME_PLACE:
-        return f"{entry.name} is at {_point(present.T)}, not at {_point(T)}"
+        x, y, z = (1e3 * present.T[:3, 3]).tolist()
+        return f"{entry.name} is elsewhere, at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
     if float(np.abs(T[:3, :3] - present.T[:3, :3]).max()) > SAME_TURN:
         return f"{entry.name} is turned"
     return ""
-
-
-def _point(T: FloatArray) -> str:
-    x, y, z = (1e3 * T[:3, 3]).tolist()
-    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
 def _T_palm_tool(session: Session) -> FloatArray | None:
