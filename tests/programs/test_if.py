@@ -14,9 +14,9 @@ from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.compiler import MAX_COPIES, Compiler, ConditionalJump
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
-from katana450.extensions.programs.run.simulation import Timeline, moments
+from katana450.extensions.programs.run.simulation import moments
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.server.step_list import marks, planned_steps, steps_of
+from katana450.extensions.programs.server.page_state import marks, planned_steps, steps_of
 from tests.programs.conftest import Stage
 from tests.ticks import TICK, ticked
 
@@ -61,18 +61,17 @@ def turned(state: State, end: State, axis: int) -> float:
 
 
 def test_steps_are_repeated_until_a_condition_holds(stage: Stage, empty: State) -> None:
-    turn = "[{nudge: {axis: 5, by: 10}}, {wait: 2}]"
-    text = f"  - repeat: {{times: 4, until: {{time: {{at_least: TIME}}}}, steps: {turn}}}\n"
-    program = planned(stage, text.replace("TIME", "3"), empty)
-    _, states = stage.play(program, empty)
-    assert turned(empty, states[-1], 5) == pytest.approx(20.0, abs=1e-6)
-    # The rounds that are not expected take no time on the clock of the program.
-    took = states[-1].t - empty.t
-    assert program.duration == pytest.approx(took, abs=0.03 * len(program.tasks))
-    # One that never holds ends after the last repetition.
-    program = planned(stage, text.replace("TIME", "90"), empty)
-    _, states = stage.play(program, empty)
-    assert turned(empty, states[-1], 5) == pytest.approx(40.0, abs=1e-6)
+    turn = "[{fill: 10}, {nudge: {axis: 5, by: 10}}]"
+    text = (
+        f"  - repeat: {{times: 4, until: {{volume: {{of: cup, at_least: ML}}}}, steps: {turn}}}\n"
+    )
+    # A round that is not expected takes no time on the clock of the program.
+    for ml, rounds in ((5, 1), (90, 4)):
+        program = planned(stage, text.replace("ML", str(ml)), empty)
+        _, states = stage.play(program, empty)
+        assert turned(empty, states[-1], 5) == pytest.approx(10.0 * rounds, abs=1e-6)
+        took = states[-1].t - empty.t
+        assert program.duration == pytest.approx(took, abs=0.03 * len(program.tasks))
     for until, why in (("{}", "An until needs exactly one of"), ("{held: 1}", "Expected a text")):
         with pytest.raises(ScriptError, match=why):
             parse(f"steps:\n  - repeat: {{times: 2, until: {until}, steps: [home]}}\n")
@@ -123,13 +122,12 @@ def test_step_after_the_same_end_is_planned_once(stage: Stage, empty: State) -> 
     seconds = [task.action.plan.duration for task in paths if isinstance(task.action, FollowPlan)]
     # One clock: duration, preview and time left are those of the predicted run, here of `else`.
     assert program.duration == pytest.approx(sum(seconds[2:]))
-    assert Timeline.of(program).span == program.duration
     left = runner.seconds_left(program, Run(0.0), empty)
     assert left == pytest.approx(program.duration)
     full = with_water(stage, 60.0)
     then = planned(stage, text, full)
     shorter = seconds[0] + seconds[1] + seconds[5]
-    assert then.duration == pytest.approx(shorter) == Timeline.of(then).span
+    assert then.duration == pytest.approx(shorter)
     # A run that takes another alternative counts that one as soon as it has chosen.
     choice = program.tasks[1].action
     assert isinstance(choice, ConditionalJump)
@@ -140,7 +138,7 @@ def test_step_after_the_same_end_is_planned_once(stage: Stage, empty: State) -> 
     assert turned(empty, states[-1], 1) == pytest.approx(3.0)
 
 
-def test_list_of_steps_and_timeline_show_the_predicted_alternative(
+def test_list_of_steps_and_preview_show_the_predicted_alternative(
     stage: Stage, nested: Program, empty: State
 ) -> None:
     steps = steps_of(nested)
@@ -150,13 +148,12 @@ def test_list_of_steps_and_timeline_show_the_predicted_alternative(
     ]  # fmt: skip
     assert [step.predicted for step in steps] == [True, False, False, False, True]
     assert all(step.seconds > 0.0 for step in steps if "nudge" in step.name)
-    timeline = Timeline.of(nested)
-    assert timeline.span == pytest.approx(steps[4].seconds)
-    assert marks(steps, None, 0.5 * timeline.span) == ("", "", "", "", "shown")
-    *_, last = moments(nested, timeline, stage.session, empty)
-    assert last.t == pytest.approx(timeline.span)
-    # Another alternative than the predicted one is not on the timeline.
-    *_, last = moments(nested, timeline, stage.session, with_water(stage, 60.0))
+    assert nested.preview_time == pytest.approx(steps[4].seconds)
+    assert marks(steps, None, 0.5 * nested.preview_time) == ("", "", "", "", "shown")
+    *_, last = moments(nested, stage.session, empty)
+    assert last.t == pytest.approx(nested.duration)
+    # Another alternative than the predicted one is not in the preview.
+    *_, last = moments(nested, stage.session, with_water(stage, 60.0))
     assert last.t == 0.0
     state = with_water(stage, 60.0)
     run, states = stage.play(nested, state)
@@ -187,13 +184,8 @@ def test_state_is_measured_when_the_step_is_reached(stage: Stage, empty: State) 
 @pytest.mark.parametrize(
     ("condition", "holds"),
     [
-        ("time: {at_least: 500 ms}", True),
-        ("time: {at_least: 2}", False),
-        ("time: {at_most: 2 min}", True),
-        ("gripper: {at_least: 1}", False),
         ("held: cup", False),
-        ("placed: {object: cup, at: [0, 0, 0], within: 1000}", True),
-        ("placed: {object: cup, at: [0, 0, 0]}", False),
+        ("held: basin", False),
         ("volume: {of: basin, at_most: 1}", True),
     ],
 )
@@ -219,20 +211,18 @@ def test_condition_that_never_holds_is_refused(stage: Stage, condition: str, sai
         planned(stage, f"  - if: {{{condition}, then: [home]}}\n", stage.begin())
 
 
-def test_alternatives_in_loops_and_definitions(stage: Stage, empty: State) -> None:
+def test_alternatives_in_loops(stage: Stage, empty: State) -> None:
     text = """\
 let: {limit: 50}
-define:
-  turn:
-    with: {by: 5}
-    steps:
-      - if:
-          volume: {of: cup, at_least: limit}
-          then: [{nudge: {axis: 5, by: by}}]
-          else: [{nudge: {axis: 5, by: -by}}]
 steps:
-  - repeat: {times: 2, index: i, steps: [{call: {name: turn, with: {by: (i + 1) * 2}}}]}
-  - call: turn
+  - for_each:
+      name: by
+      in: [2, 4, 5]
+      steps:
+        - if:
+            volume: {of: cup, at_least: limit}
+            then: [{nudge: {axis: 5, by: by}}]
+            else: [{nudge: {axis: 5, by: -by}}]
 """
     program = stage.planned(text, empty)
     assert program.steps == 9
@@ -265,7 +255,7 @@ def test_number_of_copies_of_a_step_is_bounded(stage: Stage, empty: State) -> No
 
 def test_impossible_step_of_an_alternative_is_refused(stage: Stage, empty: State) -> None:
     text = (
-        "  - if:\n      time: {at_least: 3}\n      then: [home]\n"
+        "  - if:\n      volume: {of: cup, at_least: 3}\n      then: [home]\n"
         "      else:\n        - move: {x: 3, y: 0, z: 5}\n"
     )
     with pytest.raises(ScriptError, match="cannot be") as refused:
@@ -279,17 +269,17 @@ def test_impossible_step_of_an_alternative_is_refused(stage: Stage, empty: State
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        ("{then: [home]}", "An if needs exactly one of held, placed, volume"),
-        ("{held: cup, time: {at_least: 1}, then: [home]}", "exactly one of"),
+        ("{then: [home]}", "An if needs exactly one of held, volume\\."),
+        ("{held: cup, volume: {of: cup, at_least: 1}, then: [home]}", "exactly one of"),
         ("{held: cup}", "An if needs 'then'"),
         ("{held: cup, then: []}", "Expected a list of steps"),
         ("{held: cup, then: [home], else: []}", "Expected a list of steps"),
         ("{held: cup, then: [home], otherwise: [home]}", "has no 'otherwise'"),
         ("{held: cup, then: [hme]}", "did you mean 'home'"),
-        ("{time: {}, then: [home]}", "A time needs `at_least` or `at_most`"),
-        ("{time: {at_least: 3 mm}, then: [home]}", "not a length"),
-        ("{gripper: 3, then: [home]}", "must be a mapping"),
-        ("{gripper: {u: 3}, then: [home]}", "A gripper has no 'u'"),
+        ("{volume: {of: cup}, then: [home]}", "A volume needs `at_least` or `at_most`"),
+        ("{volume: {of: cup, at_least: 3 mm}, then: [home]}", "not a length"),
+        ("{volume: 3, then: [home]}", "must be a mapping"),
+        ("{volume: {u: 3}, then: [home]}", "A volume has no 'u'"),
         ("held", "must be a mapping"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Test named poses as points, relative moves, and corners and waits of size 0."""
+"""Test named poses as points, and corners and waits of size 0."""
 
 from __future__ import annotations
 
@@ -64,14 +64,6 @@ def test_pose_by_joints_is_no_point(step: str) -> None:
     with pytest.raises(ScriptError, match=r"it is no point\. Use it in `move`") as refused:
         parse(f"{HEAD}  - {step}\n")
     assert refused.value.problems[0].line == 9
-
-
-def test_move_by_is_relative_to_the_present_place(stage: Stage) -> None:
-    target = end(stage, planned(stage, "  - move: {by: {y: 3 cm, z: 20}, pitch: 55}\n"))
-    assert in_base(stage, target.position) == pytest.approx([320, -10, 170], abs=1e-6)
-    assert np.degrees(target.pitch) == pytest.approx(55.0)
-    with pytest.raises(ScriptError, match="A relative move has no 'x'"):
-        parse(f"{HEAD}  - move: {{by: {{y: 3}}, x: 2}}\n")
 
 
 @pytest.mark.parametrize("step", ["lines", "via"])

@@ -1,15 +1,109 @@
-"""Program steps, their places in a script, and the choice between steps."""
+"""Program steps, their places in a script, and the conditions that choose between them."""
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
-from katana450.extensions.programs.building.conditions import Condition
+from katana450.arm.control.objects.pouring import BASIN, CUP, is_vessel
+from katana450.arm.control.state.scene_objects import named
+from katana450.arm.control.state.state import State
+from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_state import PlanState
-from katana450.extensions.programs.language.declaration import Declared
+from katana450.extensions.programs.language.declaration import Declared, Group, record
+from katana450.extensions.programs.language.kinds import ObjectName, bound, number, one_of
+from katana450.maths.water.units import MILLILITRE
+
+Millilitres = Annotated[float, number(0.0, 10_000.0, "ml")]
+
+
+class Condition(Declared):
+    """A condition on the measured state of an arm and its surroundings.
+
+    Attributes:
+        phrase: template of the words for what is measured, with the condition as ``{0}``.
+    """
+
+    phrase: ClassVar[str]
+
+    @property
+    def words(self) -> str:
+        """Words for what is measured, as in "if cup in the hand"."""
+        return self.phrase.format(self)
+
+    @abstractmethod
+    def checked(self, plan: PlanState) -> Self:
+        """Return the condition for the arm of ``plan``.
+
+        Raises InputError if it can never hold for that arm.
+        """
+
+    @abstractmethod
+    def holds(self, state: State) -> bool:
+        """Return whether it holds in ``state``."""
+
+
+@dataclass(frozen=True)
+class Held(Condition):
+    """The fingers hold this object."""
+
+    short = "name"
+    phrase = "{0.name} in the hand"
+
+    name: ObjectName
+
+    def checked(self, plan: PlanState) -> Self:
+        """Return itself. Raises InputError without such an object."""
+        plan.scene_object(self.name)
+        return self
+
+    def holds(self, state: State) -> bool:
+        """Return whether the fingers hold the object."""
+        scene_object = named(state.objects, self.name)
+        return scene_object is not None and scene_object.held
+
+
+@dataclass(frozen=True)
+class Volume(Condition):
+    """Water in the cup, the basin or another vessel, ml; both bounds are included."""
+
+    noun = "a volume"
+    needs = ("at_least", "at_most")
+    phrase = "the water in the {0.of}"
+
+    of: ObjectName
+    at_least: Millilitres = -math.inf
+    at_most: Millilitres = math.inf
+
+    def checked(self, plan: PlanState) -> Self:
+        """Return itself. Raises InputError without water, and for another object."""
+        if self.of not in (CUP, BASIN) and not is_vessel(plan.scene_object(self.of)):
+            raise InputError(f"{self.of} holds no water: only cup, basin and vessels do.")
+        if plan.state.poured is None:
+            raise InputError(
+                "There is no water: there is no cup in the scene, or nothing is filled."
+            )
+        return self
+
+    def holds(self, state: State) -> bool:
+        """Return whether the volume is within the bounds."""
+        if state.poured is None:
+            return False
+        water, vessel = state.poured.water, state.poured.water.vessel(self.of)
+        if vessel is None and self.of != BASIN:
+            return False
+        volume = (water.basin if vessel is None else vessel.volume) / MILLILITRE
+        return self.at_least <= volume <= self.at_most
+
+
+CHOICE: Group[Condition | None] = one_of(
+    {"held": bound(record(Held)), "volume": bound(record(Volume))}
+)
+"""One condition of an ``if``, in which names may stand for values."""
+
 
 STEPS: dict[str, type[Step]] = {}
 """The class of each step by its name in a script; a class enters itself with ``word``."""
