@@ -133,7 +133,7 @@ def test_only_the_first_axis_may_slide(tmp_path: Path) -> None:
 def test_script_moves_the_tool_and_gives_no_lengths_as_angles(tmp_path: Path) -> None:
     session = session_of("rail", tmp_path)
     context, start = PlanContext(session, np.eye(4)), session.begin(session.ready, 0.0, 0.0)
-    text = "steps:\n  - line: {by: {x: 50, z: 30}}\n  - move: {by: {y: 20}}\n  - home\n"
+    text = "steps:\n  - line: {by: {x: 50, z: 30}}\n  - line: {by: {y: 20}}\n  - home\n"
     program = compiled(parse(text), context, start)
     ends = [task.action.plan.end for task in program.tasks if isinstance(task.action, FollowPlan)]
     places = forward_batch(session.require_arm().chain, np.array([start.q, *ends]))[:, :3, 3]

@@ -1,17 +1,15 @@
-"""Test the names, loops and definitions of scripts, and their error messages."""
+"""Test the names and loops of scripts, and their error messages."""
 
 from __future__ import annotations
 
 import pytest
 
+from katana450.extensions.programs.language.scope import StepTarget
 from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.language.step_target import StepTarget
-from katana450.extensions.programs.script.blocks import MAX_STEPS
-from katana450.extensions.programs.script.script import Script, parse
-from katana450.extensions.programs.steps.moves import Move
+from katana450.extensions.programs.script.script import MAX_STEPS, Script, parse
+from katana450.extensions.programs.steps.moves import Line, Move
 from katana450.extensions.programs.steps.place import Pick
 from katana450.extensions.programs.steps.settings_steps import TimedPause
-from katana450.extensions.programs.steps.tool_moves import Line
 
 HEAD = """\
 let:
@@ -84,24 +82,6 @@ def test_item_of_a_list_is_a_name() -> None:
     assert [parsed.step for parsed in script.steps] == [Pick("basin")]
 
 
-def test_definition_has_parameters_with_defaults() -> None:
-    script = parse("""\
-let: {unit: 2}
-define:
-  rest: {with: {long: unit}, steps: [{wait: long}]}
-  twice: {with: {long: 1}, steps: [{call: {name: rest, with: {long: long * 10}}}, {call: rest}]}
-steps:
-  - call: twice
-  - call: {name: twice, with: {long: 3}}
-""")
-    assert waits(script) == [10.0, 2.0, 30.0, 2.0]
-
-
-def test_steps_have_the_places_of_the_definition() -> None:
-    script = parse("define:\n  rest:\n    steps:\n      - wait: 1\nsteps:\n  - call: rest\n")
-    assert [(parsed.line, parsed.column) for parsed in script.steps] == [(4, 9)]
-
-
 @pytest.mark.parametrize(
     ("text", "line", "said"),
     [
@@ -122,17 +102,6 @@ def test_steps_have_the_places_of_the_definition() -> None:
         ("steps:\n  - for_each: {name: p, in: 3, steps: [home]}", 2, "Expected a list"),
         ("steps:\n  - for_each: {name: p, in: [], steps: [home]}", 2, "list of 1 to"),
         ("steps:\n  - for_each: {in: [1], steps: [home]}", 2, "needs 'name'"),
-        ("steps:\n  - call: nothing", 2, "under `define:`"),
-        ("define: {rest: {steps: [home]}}\nsteps:\n  - call: rset", 3, "did you mean 'rest'"),
-        (
-            "define: {rest: {steps: [home]}}\nsteps:\n  - call: {name: rest, with: {a: 1}}",
-            3,
-            "no parameter 'a'",
-        ),
-        ("define: {a: {steps: [{call: a}]}}\nsteps: [home]", 1, "no definition 'a'"),
-        ("define: {a: {steps: [{call: b}]}, b: {steps: [home]}}\nsteps: [home]", 1, "'b'"),
-        ("define: {a: {steps: [{wait: -1}]}}\nsteps: [home]", 1, "not between"),
-        ("define: {a: {with: 3, steps: [home]}}\nsteps: [home]", 1, "mapping of names"),
     ],
 )
 def test_mistake_is_refused_at_its_place(text: str, line: int, said: str) -> None:

@@ -29,9 +29,9 @@ from katana450.extensions.programs.building.plan_state import (
     PlanState,
     UntimedPath,
 )
-from katana450.extensions.programs.language.places import ROOMIEST
-from katana450.extensions.programs.language.step_target import Angles, StepTarget
-from katana450.extensions.programs.steps.tool_moves import Circle, Line
+from katana450.extensions.programs.language.kinds import ROOMIEST
+from katana450.extensions.programs.language.scope import Angles, StepTarget
+from katana450.extensions.programs.steps.moves import Circle, Line
 from katana450.extensions.reachability.reachability import ReachabilityMap, reachability_map
 from katana450.library.motion_plan import MotionPlan
 from katana450.library.pose_frame import PoseFrame, dimensions

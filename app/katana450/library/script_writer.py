@@ -12,9 +12,7 @@ import numpy as np
 import yaml
 
 from katana450.errors import InputError
-from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.script.script_files import files_in
 from katana450.library.step_methods import StepMethods
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -58,19 +56,16 @@ class ScriptWriter(StepMethods):
         return text
 
     def check(self) -> None:
-        """Raise InputError with all mistakes of the script, by the lines of its YAML.
-
-        Files that it names are those of the present folder.
-        """
-        parse(attached(str(self), files_in(Path())))
+        """Raise InputError with all mistakes of the script, by the lines of its YAML."""
+        parse(str(self))
 
     def save(self, path: str | Path) -> None:
         """Write the script to a file, for ``katana450 run``. Raises InputError for a mistake."""
         self.check()
         Path(path).write_text(str(self), encoding="utf-8")
 
-    def scene(self, scene: str | Sequence[Mapping[str, Any]] | Mapping[str, Any]) -> None:
-        """Name the scene that it needs: a file, its objects, or a mapping as in a scene file."""
+    def scene(self, scene: Sequence[Mapping[str, Any]] | Mapping[str, Any]) -> None:
+        """Give the scene that it needs: its objects, or a mapping as in a scene file."""
         self._head["scene"] = plain(scene)
 
     def pose(
@@ -131,17 +126,10 @@ class ScriptWriter(StepMethods):
         finally:
             self._steps = outside
 
-    def move(
-        self, to: Point | None = None, *, by: Point | None = None, **how: Unpack[PlaceOptions]
-    ) -> None:
-        """Move to a pose or a point [mm], or by an offset [mm], on any path round obstacles."""
-        if to is not None and by is not None:
-            raise InputError("A move takes `to` or `by`, not both.")
-        if by is not None:
-            self.write("move", {"by": by, **given(**how)})
-        else:
-            is_name = isinstance(to, str) and not how
-            self.write("move", to if is_name else place_value(to, how))
+    def move(self, to: Point, **how: Unpack[PlaceOptions]) -> None:
+        """Move to a pose or a point [mm], on any path round obstacles."""
+        is_name = isinstance(to, str) and not how
+        self.write("move", to if is_name else place_value(to, how))
 
     def write(self, step: str, content: Any) -> None:
         """Append a step with its content as in a script, {} for none."""

@@ -75,123 +75,6 @@ class StepMethods:
             blend: Fraction of half a leg that a corner cuts off; 0 rests in each corner.
         """
 
-    def place(
-        self,
-        at: str | Sequence[Any] | npt.NDArray[Any] | Mapping[str, Any] | None = ...,
-        *,
-        on: str | None = ...,
-    ) -> None:
-        """Put the held object down, and draw back.
-
-        Args:
-            at: Its place: the name of a pose, [x, y, z], or x, y and, if wanted, z, yaw.
-            on: Object that carries it; its middle without `at`.
-        """
-
-    def set_down(self) -> None:
-        """Put the held object back to where it was grasped, and draw back."""
-
-    def release(self) -> None:
-        """Open the fingers on the held object where it is, and draw back."""
-
-    def pick(
-        self,
-        object: str,
-        *,
-        side: str | None = ...,
-        pitch: float | str | None = ...,
-        height: float | str | None = ...,
-    ) -> None:
-        """Grasp an object, and lift it.
-
-        Args:
-            object: Name of an object.
-            side: Side of the tool; found unless given.
-            pitch: Pitch of the tool, deg; found unless given.
-            height: Height above the underside, mm; found unless given.
-        """
-
-    def stack(
-        self,
-        object: str,
-        on: str,
-        *,
-        side: str | None = ...,
-        pitch: float | str | None = ...,
-        height: float | str | None = ...,
-    ) -> None:
-        """Pick an object, and place it on the middle of another.
-
-        Args:
-            object: Name of an object.
-            on: Name of an object.
-            side: Side of the tool; found unless given.
-            pitch: Pitch of the tool, deg; found unless given.
-            height: Height above the underside, mm; found unless given.
-        """
-
-    def pour(
-        self,
-        into: str,
-        *,
-        from_: str | None = ...,
-        ml: float | str | None = ...,
-        shake: float | str | None = ...,
-    ) -> None:
-        """Carry a held vessel over an object, turn it over, shake it, and turn it back.
-
-        Args:
-            into: Name of an object.
-            from_: The vessel in the hand, for a check.
-            ml: How much to pour, ml; all unless given.
-            shake: Number of shakes after all is poured, 3 unless given.
-        """
-
-    def gripper(self, to: float | str, *, holding: str | None = ...) -> None:
-        """Open or close the fingers, or move them to an angle, deg, or a place, mm, if they slide.
-
-        Args:
-            to: open, closed, or the angle of the fingers, deg; mm if they slide.
-            holding: Name of an object.
-        """
-
-    def wait(self, seconds: float | str) -> None:
-        """Wait, s.
-
-        Args:
-            seconds: s.
-        """
-
-    def tool(self, name: str) -> None:
-        """Tool frame of all later points: tcp, grasp or flange.
-
-        Args:
-            name: A text.
-        """
-
-    def speed(self, value: float | str) -> None:
-        """Fraction of full speed of all later motions.
-
-        Args:
-            value: .
-        """
-
-    def fill(self, water: float | str) -> None:
-        """Fill the cup with water, ml.
-
-        Args:
-            water: ml.
-        """
-
-    def put(self, object: str, x: float | str, y: float | str) -> None:
-        """Set an object to another place on the table, without the arm.
-
-        Args:
-            object: Name of an object.
-            x: mm, or a text such as 4 cm or 2 * radius.
-            y: mm, or a text such as 4 cm or 2 * radius.
-        """
-
     def line(
         self,
         to: Sequence[Any] | npt.NDArray[Any] | Mapping[str, Any] | str | None = ...,
@@ -278,6 +161,121 @@ class StepMethods:
             feed: Speed of the tool point, mm/s; slower where limits require it.
             turns: Number of turns, 1 unless given.
             branch: Branch of the arm.
+        """
+
+    def place(
+        self,
+        at: str | Sequence[Any] | npt.NDArray[Any] | Mapping[str, Any] | None = ...,
+        *,
+        on: str | None = ...,
+    ) -> None:
+        """Put the held object down, and draw back.
+
+        Args:
+            at: Its place: the name of a pose, [x, y, z], or x, y and, if wanted, z, yaw.
+            on: Object that carries it; its middle without `at`.
+        """
+
+    def set_down(self) -> None:
+        """Put the held object back to where it was grasped, and draw back."""
+
+    def release(self) -> None:
+        """Open the fingers on the held object where it is, and draw back."""
+
+    def pick(
+        self,
+        object: str,
+        *,
+        side: str | None = ...,
+        pitch: float | str | None = ...,
+        height: float | str | None = ...,
+    ) -> None:
+        """Grasp an object, and lift it.
+
+        Args:
+            object: Name of an object.
+            side: Side of the tool; found unless given.
+            pitch: Pitch of the tool, deg; found unless given.
+            height: Height above the underside, mm; found unless given.
+        """
+
+    def stack(
+        self,
+        object: str,
+        on: str,
+        *,
+        side: str | None = ...,
+        pitch: float | str | None = ...,
+        height: float | str | None = ...,
+    ) -> None:
+        """Pick an object, and place it on the middle of another.
+
+        Args:
+            object: Name of an object.
+            on: Name of an object.
+            side: Side of the tool; found unless given.
+            pitch: Pitch of the tool, deg; found unless given.
+            height: Height above the underside, mm; found unless given.
+        """
+
+    def pour(
+        self,
+        into: str,
+        *,
+        ml: float | str | None = ...,
+        shake: float | str | None = ...,
+    ) -> None:
+        """Carry a held vessel over an object, turn it over, shake it, and turn it back.
+
+        Args:
+            into: Name of an object.
+            ml: How much to pour, ml; all unless given.
+            shake: Number of shakes after all is poured, 3 unless given.
+        """
+
+    def gripper(self, to: float | str, *, holding: str | None = ...) -> None:
+        """Open or close the fingers, or move them to an angle, deg, or a place, mm, if they slide.
+
+        Args:
+            to: open, closed, or the angle of the fingers, deg; mm if they slide.
+            holding: Name of an object.
+        """
+
+    def wait(self, seconds: float | str) -> None:
+        """Wait, s.
+
+        Args:
+            seconds: s.
+        """
+
+    def tool(self, name: str) -> None:
+        """Tool frame of all later points: tcp, grasp or flange.
+
+        Args:
+            name: A text.
+        """
+
+    def speed(self, value: float | str) -> None:
+        """Fraction of full speed of all later motions.
+
+        Args:
+            value: .
+        """
+
+    def fill(self, water: float | str) -> None:
+        """Fill the cup with water, ml.
+
+        Args:
+            water: ml.
+        """
+
+    def put(self, object: str, x: float | str, y: float | str) -> None:
+        """Set an object to another place on the table, without the arm.
+
+        Args:
+            object: Name of an object.
+            x: mm, or a text such as 4 cm or 2 * radius.
+            y: mm, or a text such as 4 cm or 2 * radius.
         """
 
     def trajectory(self, through: Sequence[Any] | npt.NDArray[Any]) -> None:

@@ -1,46 +1,229 @@
-"""A script: its names, poses and steps, each with its line, and the JSON Schema of scripts."""
+"""A script: its names, poses and steps, each with its line, and the JSON Schema of scripts.
+
+What repeats steps or chooses between them is written out as it is read.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Annotated
 
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands.commands import MIN_SPEED
-from katana450.extensions.programs.building.step import LocatedStep
+from katana450.extensions.programs.building.step import (
+    CHOICE,
+    Condition,
+    Conditional,
+    LocatedStep,
+    Step,
+    count,
+)
 from katana450.extensions.programs.language.declaration import (
     Declared,
     Fields,
     Kind,
     Schema,
+    or_known,
     record,
 )
 from katana450.extensions.programs.language.kinds import (
     DEFINITIONS,
+    PLACE,
     RAW,
     TEXT,
     any_of,
+    bound,
     choice,
+    listed,
     mapping,
     number,
+    reference,
+    whole,
 )
-from katana450.extensions.programs.language.places import PLACE
 from katana450.extensions.programs.language.scope import ScriptContext
 from katana450.extensions.programs.language.source import Problem, ScriptError, YamlValue, read
-from katana450.extensions.programs.script.blocks import (
-    BLOCKS,
-    DEFINED,
-    INNER_STEPS,
-    STEP_LIST,
-    with_definitions,
-)
 from katana450.extensions.programs.script.measures import MEASURES
-from katana450.extensions.programs.script.script_scene import SCENE, ScriptScene
+from katana450.extensions.programs.script.script_scene import SCENE, SceneDraft
 from katana450.extensions.programs.steps.settings_steps import Tool
 from katana450.extensions.programs.steps.steps import STEPS
+
+MAX_STEPS = 1000
+"""Maximum number of steps, with all repetitions."""
+
+MAX_REPETITIONS = 1000
+"""Maximum count of a ``repeat``, and of the values of a ``for_each``."""
+
+
+def read_steps(value: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ...]:
+    """Read a list of steps. Raises ScriptError with all problems."""
+    located: list[LocatedStep] = []
+    total = 0
+    problems: list[Problem] = []
+    for item in value.items if value.kind == "list" else ():
+        try:
+            steps = _read_step(item, context)
+            located += steps
+            total += count(steps)
+        except ScriptError as error:
+            problems += error.problems
+        if total > MAX_STEPS:
+            text = f"A script has at most {MAX_STEPS} steps, repetitions counted."
+            problems += item.wrong(text).problems
+            break
+    if value.kind != "list" or not value.items:
+        what = "an empty one" if value.kind == "list" else value
+        problems += value.wrong(f"Expected a list of steps, not {what}.").problems
+    if problems:
+        # A step that is repeated has its problem once.
+        raise ScriptError(tuple(dict.fromkeys(problems)))
+    return tuple(located)
+
+
+def _read_step(item: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ...]:
+    """Return one step, or those of a block."""
+    name, value = item, YamlValue(item.line, item.column, None, "nothing")
+    if item.kind == "mapping":
+        if len(item.fields) != 1:
+            names = ", ".join(str(name.held) for name, _ in item.fields)
+            raise item.wrong(f"A step must be one name with its value, not {names or 'none'}.")
+        ((name, value),) = item.fields
+    word = str(name.held)
+    if word in BLOCKS:
+        steps = BLOCKS[word].read(value, context).steps_at(name, context)
+        if count(steps) > MAX_STEPS:
+            raise name.wrong(f"This gives {count(steps)} steps; the maximum is {MAX_STEPS}.")
+        return steps
+    known = (*STEPS, *BLOCKS)
+    if name.held not in known:
+        raise name.wrong(f"There is no step {name}{or_known(word, known)}")
+    value = context.scope.bound(value)
+    return _located(name, STEPS[word].read(value, context))
+
+
+TIMES = whole(1, MAX_REPETITIONS, "How often; with `until`, at most")
+VALUES = Kind(
+    listed(RAW, 1, MAX_REPETITIONS).read,
+    any_of("The values", {"type": "array", "minItems": 1}, TEXT.schema),
+)
+INNER_STEPS = Kind(read_steps, reference("steps"))
+TEXT_OF_STEPS = Kind(RAW.read, reference("steps"))
+WORD = Kind(RAW.read, TEXT.schema)
+
+STEP_LIST: Schema = {
+    "description": "Steps in their order",
+    "type": "array",
+    "items": reference("step"),
+    "minItems": 1,
+    "maxItems": MAX_STEPS,
+}
+
+
+class StepBlock(Declared):
+    """Something that stands for several steps."""
+
+    @abstractmethod
+    def steps_at(self, name: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ...]:
+        """Return the steps of the block ``name``. Raises ScriptError."""
+
+
+@dataclass(frozen=True)
+class Until(Declared):
+    """Repeat until this holds after the steps."""
+
+    noun = "an until"
+
+    condition: Annotated[Condition, CHOICE]
+
+
+@dataclass(frozen=True)
+class Repeat(StepBlock):
+    """Repeat steps."""
+
+    noun = "a repeat"
+    excludes = ("until", "index")
+
+    times: Annotated[int, bound(TIMES)]
+    steps: Annotated[YamlValue, TEXT_OF_STEPS]
+    until: Annotated[Until | None, record(Until)] = None
+    index: Annotated[YamlValue | None, WORD.about("Name of the counter, from 0")] = None
+
+    def steps_at(self, name: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ...]:
+        """Return the steps; without an index the same ones again, which are planned only once."""
+        index, times = self.index, self.times
+        if index is not None:
+            numbers = (
+                YamlValue(index.line, index.column, str(i), "whole", float(i)) for i in range(times)
+            )
+            return _each(self.steps, index, numbers, context)
+        steps = read_steps(self.steps, context)
+        if self.until is None or times * (count(steps) + 1) > MAX_STEPS:
+            return steps * min(times, MAX_STEPS + 1)
+        repeated = steps
+        for _ in range(times - 1):
+            until = Conditional(self.until.condition, (), repeated)
+            repeated = (*steps, *_located(name, until))
+        return repeated
+
+
+@dataclass(frozen=True)
+class ForEach(StepBlock):
+    """Do steps once for each value of a list."""
+
+    noun = "a for_each"
+
+    name: Annotated[YamlValue, WORD.about("Name of the value in the steps")]
+    values: Annotated[tuple[YamlValue, ...], bound(VALUES).named("in")]
+    steps: Annotated[YamlValue, TEXT_OF_STEPS]
+
+    def steps_at(self, name: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ...]:  # noqa: ARG002
+        """Return the steps for each value."""
+        return _each(self.steps, self.name, self.values, context)
+
+
+def _each(
+    steps: YamlValue, name: YamlValue, values: Iterable[YamlValue], context: ScriptContext
+) -> tuple[LocatedStep, ...]:
+    """Return ``steps`` once for each value of ``name``; not all of them if they are too many."""
+    located: list[LocatedStep] = []
+    total = 0
+    for value in values:
+        inner = read_steps(steps, replace(context, scope=context.scope.having(name, value)))
+        located += inner
+        total += count(inner)
+        if total > MAX_STEPS:
+            break
+    return tuple(located)
+
+
+@dataclass(frozen=True)
+class If(StepBlock):
+    """Steps that depend on one condition, which is measured when the step is reached."""
+
+    noun = "an if"
+
+    condition: Annotated[Condition, CHOICE]
+    then: Annotated[tuple[LocatedStep, ...], INNER_STEPS.about("Steps if the condition holds")]
+    otherwise: Annotated[
+        tuple[LocatedStep, ...], INNER_STEPS.about("Steps if it does not hold").named("else")
+    ] = ()
+
+    def steps_at(self, name: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ...]:  # noqa: ARG002
+        """Return the choice."""
+        return _located(name, Conditional(self.condition, self.then, self.otherwise))
+
+
+BLOCKS: dict[str, type[StepBlock]] = {"repeat": Repeat, "for_each": ForEach, "if": If}
+"""Class of each block, which stands for several steps, by its name in a script."""
+
+
+def _located(place: YamlValue, *steps: Step | Conditional) -> tuple[LocatedStep, ...]:
+    """Return ``steps`` with the place of ``place``."""
+    return tuple(LocatedStep(step, place.line, place.column) for step in steps)
+
 
 FRAME = choice("shoulder", "base")
 """The frame of points."""
@@ -49,11 +232,7 @@ FRAME = choice("shoulder", "base")
 def context_of(fields: Fields) -> ScriptContext:
     """Return the names of a script with these fields, which collect all problems."""
     context = ScriptContext(fields.take("frame", FRAME, "shoulder") == "base")
-    for name, extend in (
-        ("let", _with_values),
-        ("poses", _with_poses),
-        ("define", with_definitions),
-    ):
+    for name, extend in (("let", _with_values), ("poses", _with_poses)):
         context = fields.take(name, partial(extend, context=context), context)
     return context
 
@@ -166,15 +345,11 @@ class Script(Declared):
         Kind(_tool, TEXT.schema).about("Tool frame of all points: tcp, grasp or flange"),
     ] = None
     speed: Annotated[float, number(MIN_SPEED, 1.0, about="Fraction of full speed")] = 1.0
-    scene: Annotated[ScriptScene | None, SCENE] = None
+    scene: Annotated[SceneDraft | None, SCENE] = None
     let: Annotated[YamlValue | None, _names("Named values; later ones may use earlier ones")] = None
     poses: Annotated[
         YamlValue | None,
         _names("Named places; later ones may use the names of earlier ones", PLACE),
-    ] = None
-    define: Annotated[
-        YamlValue | None,
-        _names("Named steps with parameters; each may call those above it", DEFINED),
     ] = None
     expected: Annotated[
         Mapping[str, tuple[float, float]],
