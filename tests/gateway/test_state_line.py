@@ -16,7 +16,7 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.messages import STATUS
 from katana450.arm.control.state.state import Finding, Reason, Status
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.server.state_line import ENDS, duration
+from katana450.extensions.programs.server.page_state import ENDS, duration
 from katana450.server.api.program_requests import ProgramOrder
 from tests.gateway.client import Control
 from tests.gateway.test_hub import PAGES

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,9 +15,8 @@ from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase, Run
-from katana450.extensions.programs.run.simulation import Timeline
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.server.step_list import steps_of
+from katana450.extensions.programs.server.page_state import steps_of
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.programs.conftest import Stage
 
@@ -77,21 +77,6 @@ def test_lines_have_rounded_corners_and_end_at_rest(stage: Stage) -> None:
     assert stage.loads(states).max() <= 1.0 + 1e-6
 
 
-def test_a_timeline_agrees_with_the_run(stage: Stage, program: Program) -> None:
-    timeline = Timeline.of(program)
-    (first, _), (last, fingers) = timeline.at(0.0), timeline.at(timeline.span)
-    assert np.array_equal(first, program.start)
-    _, states = stage.play(program, stage.begin())
-    assert last == pytest.approx(states[-1].q, abs=1e-12)
-    assert fingers == stage.plan_context.arm.gripper.upper
-    assert timeline.at(-1.0)[0] == pytest.approx(first)
-    assert timeline.at(timeline.span + 1.0)[0] == pytest.approx(last, abs=1e-12)
-    run_by = np.array([state.q for state in states])
-    for t in np.linspace(0.0, timeline.span, 23).tolist():
-        q, _ = timeline.at(t)
-        assert np.abs(run_by - q).max(axis=1).min() < 0.02
-
-
 def test_a_pause_stays_on_the_path_and_does_not_count_as_waiting(
     stage: Stage, program: Program
 ) -> None:
@@ -140,8 +125,8 @@ def test_steps_are_taken_one_at_a_time(stage: Stage, program: Program) -> None:
         run, state = stage.tick(program, run, state)
         if state.paused and state.motion.at_rest:
             rests.append(program.tasks[run.number].line)
-            run, commands = runner.stepping(run)
-            state = stage.session.step(state, commands, state.t + 0.01)
+            run = replace(run, single=True)
+            state = stage.session.step(state, [cmd.Resume()], state.t + 0.01)
         if run.phase is not Phase.RUNNING:
             break
     assert run.phase is Phase.DONE

@@ -31,18 +31,18 @@ def report(fraction: float) -> None:
 def progress(
     items: Iterable[T], total: int, label: str, stream: TextIO | None = None
 ) -> Iterator[T]:
-    """Yield ``items``, of which there are ``total``, and show the fraction that was yielded."""
+    """Yield ``items``, of which about ``total`` are expected, and show the fraction of them."""
     stream = stream or sys.stderr
     if not stream.isatty():
         for done, item in enumerate(items):
-            report(done / max(total, 1))
+            report(min(done / max(total, 1), 1.0))
             yield item
         return
     shown = -math.inf
     try:
         for done, item in enumerate(items, 1):
             if monotonic() - shown >= PERIOD or done == total:
-                print(f"\r{label} {done / total:4.0%}", end="", file=stream, flush=True)
+                print(f"\r{label} {min(done / total, 1.0):4.0%}", end="", file=stream, flush=True)
                 shown = monotonic()
             yield item
     finally:

@@ -10,7 +10,6 @@ from katana450.arm.control.state.state import State
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan, SetSpeed, Task, expected_time
-from katana450.extensions.programs.building.conditions import ProgramTime
 from katana450.extensions.programs.building.plan_state import PlanContext, PlanState
 from katana450.extensions.programs.building.step import (
     Conditional,
@@ -19,7 +18,7 @@ from katana450.extensions.programs.building.step import (
     numbered,
     titles,
 )
-from katana450.extensions.programs.language.step_target import ScriptFrame
+from katana450.extensions.programs.language.scope import ScriptFrame
 from katana450.extensions.programs.run.compiler import Compiler, ConditionalJump, Report
 from katana450.extensions.programs.script.script import Script
 from katana450.maths.geometry.arrays import FloatArray
@@ -40,18 +39,16 @@ class Alternatives(NamedTuple):
 
 
 class ExpectedTask(NamedTuple):
-    """A task of the predicted run: its index, and when it begins and ends at which speed.
+    """A task of the predicted run: its index, and when it begins and ends.
 
     Attributes:
         number: its index.
         begin, end: expected times since the run began [s].
-        speed: fraction of full speed.
     """
 
     number: int
     begin: float
     end: float
-    speed: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,25 +84,17 @@ class Program:
         """The number of steps."""
         return len(self.titles)
 
-    def next(self, number: int) -> tuple[int, ...]:
-        """Return the tasks that may follow the task ``number``.
+    def next(self, number: int, state: State | None = None) -> int:
+        """Return the task that follows the task ``number`` in ``state``; None: as predicted.
 
         The number of tasks stands for the end.
         """
         task = self.tasks[number]
         if isinstance(task.action, ConditionalJump):
-            return tuple(dict.fromkeys((task.action.then, task.action.otherwise)))
-        return (number + 1 if task.after is None else task.after,)
-
-    def next_in(self, number: int, state: State, elapsed: float) -> int:
-        """Return the task that follows the task ``number`` in ``state``.
-
-        ``elapsed``: time since the program began [s].
-        """
-        action = self.tasks[number].action
-        if isinstance(action, ConditionalJump):
-            return action.then if action.condition.holds(state, elapsed) else action.otherwise
-        return self.next(number)[0]
+            jump = task.action
+            holds = jump.predicted if state is None else jump.condition.holds(state)
+            return jump.then if holds else jump.otherwise
+        return number + 1 if task.after is None else task.after
 
     @cached_property
     def schedule(self) -> tuple[ExpectedTask, ...]:
@@ -116,6 +105,13 @@ class Program:
     def duration(self) -> float:
         """Expected duration [s] of the predicted run, at the speeds of the program."""
         return self.schedule[-1].end
+
+    @property
+    def preview_time(self) -> float:
+        """The duration [s] of its preview; 0 without a motion, and if it continues a run."""
+        actions = (self.tasks[task.number].action for task in self.schedule)
+        moves = any(isinstance(action, FollowPlan) for action in actions)
+        return self.duration if moves and not self.first else 0.0
 
     def expected(
         self,
@@ -129,7 +125,6 @@ class Program:
         """Return the tasks of the predicted run from the task ``number``, in their order.
 
         This is the one clock of a program: of its preview, its list of steps and its time left.
-        Where the planning cannot predict a condition, ``else`` counts.
 
         Args:
             number: index of the task.
@@ -144,15 +139,9 @@ class Program:
             if isinstance(action, SetSpeed):
                 speed = min(action.scale(self.speed), allowed)
             end = begin + (expected_time(action, speed) if left is None else left)
-            tasks.append(ExpectedTask(number, begin, end, speed))
+            tasks.append(ExpectedTask(number, begin, end))
             begin, left = end, None
-            if isinstance(action, ConditionalJump):
-                holds = action.predicted
-                if isinstance(action.condition, ProgramTime):
-                    holds = action.condition.has(end)
-                number = action.then if holds else action.otherwise
-            else:
-                number = self.next(number)[0]
+            number = self.next(number)
         return tuple(tasks)
 
     @property

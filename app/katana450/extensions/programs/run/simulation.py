@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -31,7 +30,6 @@ from katana450.extensions.programs.script.script import Script
 from katana450.extensions.progress import progress
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.maths.motion.limiter import JointMotion
-from katana450.maths.planning.plan import Segment
 from katana450.settings import Settings
 
 MAX_DURATION = 24 * 3600.0
@@ -182,17 +180,11 @@ def run_by_clock(plan: Planned, driver: Driver | None = None) -> Simulation:
         return driven(session, state, state.t, driver.send)
 
     run, states, tasks = Run(0.0), [plan.start], [0]
-    done, total = 0, 1000
-    ticks = progress(range(total), total, plan.script.name)
-    for state, run in simulated(program, session, plan.start, period, drive):
+    ticks = simulated(program, session, plan.start, period, drive)
+    total = math.ceil(program.duration / period) + len(program.tasks)
+    for state, run in progress(ticks, total, plan.script.name):
         states.append(state)
         tasks.append(run.number)
-        fraction = (run.number + runner.task_fraction(program, run, state)) / len(program.tasks)
-        while done < int(min(fraction, 1.0) * total):
-            done += 1
-            next(ticks, None)
-    for _ in ticks:
-        pass
     if run.phase is not Phase.DONE:
         raise KatanaError(run.why)
     return Simulation(program, session, run, tuple(states), np.array(tasks, dtype=np.int64))
@@ -204,132 +196,44 @@ TICK = 0.02
 MAX_MOMENTS = 3000
 """Maximum number of states that are kept of a simulation."""
 
-TAU_SAMPLES = 65
-"""Number of points at which the place on a segment is tabulated by time."""
-
-
-class Piece(NamedTuple):
-    """A segment of a plan on the timeline.
-
-    Attributes:
-        begin: time at which it begins [s].
-        speed: fraction of full speed.
-        segment: the segment.
-        fingers: the finger joint [rad].
-    """
-
-    begin: float
-    speed: float
-    segment: Segment
-    fingers: float
-
-
-@dataclass(frozen=True, eq=False)
-class Timeline:
-    """The motions of a program on the clock of its schedule: at its speeds, with its waits.
-
-    Of two alternatives it has the predicted one.
-
-    Attributes:
-        pieces: the segments in their order. Between them the arm rests.
-        firsts: index of the first segment of each task with a motion, by the index of the task.
-        schedule: the tasks of the predicted run, by their index.
-        span: the duration [s].
-    """
-
-    pieces: tuple[Piece, ...]
-    firsts: Mapping[int, int]
-    schedule: Mapping[int, ExpectedTask]
-    span: float
-
-    @staticmethod
-    def of(program: Program) -> Timeline:
-        """Return the timeline of ``program``."""
-        pieces: list[Piece] = []
-        firsts: dict[int, int] = {}
-        for task in program.schedule:
-            action, begin = program.tasks[task.number].action, task.begin
-            if isinstance(action, FollowPlan):
-                firsts[task.number] = len(pieces)
-                for segment in action.plan.segments:
-                    pieces.append(Piece(begin, task.speed, segment, action.plan.fingers))
-                    begin += segment.scaling.duration_at(task.speed)
-        schedule = {task.number: task for task in program.schedule}
-        return Timeline(tuple(pieces), firsts, schedule, program.schedule[-1].end)
-
-    @staticmethod
-    def previewed(program: Program) -> Timeline | None:
-        """Return the timeline of the preview of ``program``; None if it has none.
-
-        A program without motions has none, and one that continues in the middle of a motion.
-        """
-        timeline = Timeline.of(program)
-        return timeline if timeline.pieces and not program.first else None
-
-    def at(self, t: float) -> tuple[FloatArray, float]:
-        """Return the joints (5,) and the fingers [rad] at ``t`` [s], from 0 to ``span``.
-
-        The timeline must not be empty.
-        """
-        number = max(bisect_right(self.pieces, t, key=lambda piece: piece.begin) - 1, 0)
-        begin, speed, segment, fingers = self.pieces[number]
-        return segment.at(segment.scaling.tau_after(t - begin, speed)).q, fingers
-
-    def time_of(self, state: State, run: Run) -> float:
-        """Return the time [s] of ``state`` on it, in which the program is at a task of ``run``."""
-        task, first = self.schedule[run.number], self.firsts.get(run.number)
-        following = state.following
-        if first is None:
-            return min(task.begin + run.waited * run.started, task.end)
-        number = first if following is None else first + following.number
-        piece = self.pieces[min(number, len(self.pieces) - 1)]
-        if following is None or piece.segment is not following.segment:
-            # No segment of this task is under way.
-            return task.begin
-        times, taus = self._tables[number]
-        return piece.begin + float(np.interp(following.local, taus, times))
-
-    @cached_property
-    def _tables(self) -> list[tuple[FloatArray, FloatArray]]:
-        """The times since the start of each segment [s], and tau [s] at these."""
-        tables = []
-        for _, speed, segment, _ in self.pieces:
-            scaling = segment.scaling
-            times = np.linspace(0.0, scaling.duration_at(speed), TAU_SAMPLES)
-            taus = np.array([scaling.tau_after(t, speed) for t in times.tolist()])
-            tables.append((times, taus))
-        return tables
-
 
 class Moment(NamedTuple):
-    """A state of the simulation, and its time on the timeline [s]."""
+    """A state of the simulation, and its time on the clock of the program [s]."""
 
     t: float
     state: State
 
 
-def moments(
-    program: Program, timeline: Timeline, session: Session, state: State
-) -> Iterator[Moment]:
-    """Simulate ``program`` from ``state``; yield moments at increasing times of ``timeline``.
+def moments(program: Program, session: Session, state: State) -> Iterator[Moment]:
+    """Simulate ``program`` from ``state``; yield moments at increasing times of its schedule.
 
-    A program that fails, or takes another alternative than
-    predicted, ends early. One that takes longer than a day raises InputError.
+    A program that fails, or takes another alternative than predicted, ends early. One that takes
+    longer than a day raises InputError.
     """
     at_rest = JointMotion.rest(state.setpoint)
     start = replace(
         state, stopped=None, paused=False, blocked=False, findings=(), mode=IDLE, motion=at_rest,
         goal=state.setpoint, gripper_goal=state.gripper_setpoint,
     )  # fmt: skip
-    apart = max(TICK, timeline.span / MAX_MOMENTS)
+    expected = {task.number: task for task in program.schedule}
+    apart = max(TICK, program.duration / MAX_MOMENTS)
     last = Moment(0.0, start)
     yielded = -apart
     for now, run in simulated(program, session, start, TICK, follow_exactly):
-        if run.number not in timeline.schedule:
+        if run.number not in expected:
             break
-        t = max(timeline.time_of(now, run), last.t)
+        t = max(_time_of(program, expected[run.number], run, now), last.t)
         if t > last.t and last.t - yielded >= apart:
             yield last
             yielded = last.t
         last = Moment(t, now)
     yield last
+
+
+def _time_of(program: Program, task: ExpectedTask, run: Run, state: State) -> float:
+    """Return the time [s] of ``state``, in which ``run`` is at ``task``, on the schedule."""
+    if run.phase is Phase.DONE:
+        return task.end
+    if isinstance(program.tasks[task.number].action, FollowPlan):
+        return task.begin + runner.task_fraction(program, run, state) * (task.end - task.begin)
+    return min(task.begin + run.waited * run.started, task.end)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import viser
 
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
@@ -23,9 +24,9 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.errors import KatanaError
-from katana450.extensions.programs.building.actions import FollowPlan, UseTool
+from katana450.extensions.programs.building.actions import FollowPlan, GiveCommand
 from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.run.simulation import Moment, Timeline, moments
+from katana450.extensions.programs.run.simulation import Moment, moments
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.programs.server.traces import DRIVEN
 from katana450.extensions.water import WaterNodes
@@ -63,11 +64,6 @@ class GhostScene:
         self._props = load_props()
         self._shapes: dict[str, tuple[viser.FrameHandle, ObjectShape]] = {}
         self._water: WaterNodes | None = None
-
-    def prepare(self, objects: Iterable[SceneObject]) -> None:
-        """Send hidden ghosts of ``objects``: reading the shape of one can take a second."""
-        for scene_object in objects:
-            self._drawn(scene_object)
 
     def show(self, session: Session, start: State, state: State) -> None:
         """Show what differs in ``state`` from ``start``, both of ``session``."""
@@ -141,9 +137,6 @@ def _amounts(poured: MotionWithWater | None) -> tuple[int, ...]:
 
 log = logging.getLogger(__name__)
 
-NEWEST = 0.1
-"""[s] Age up to which the last simulated state is shown for a time after it."""
-
 COLOUR: Colour = (64, 156, 255)
 """Colour of the path."""
 
@@ -159,8 +152,8 @@ LOOK_OPACITY = 0.5
 class PreviewNodes:
     """The path line, kept until the arm is driven after the run, and a ghost, kept until it runs.
 
-    The ghost is sent when it is first shown. Objects and water are simulated in a thread, which
-    takes a second for a minute of motion. Until then a time shows the arm alone.
+    The ghost is sent when it is first shown. The program is simulated in a thread, which takes a
+    second for a minute of motion. Until then a later time shows the newest simulated state.
     """
 
     def __init__(
@@ -193,9 +186,8 @@ class PreviewNodes:
             if paths:
                 self._path_line.points = np.concatenate(paths).astype(np.float32)
             self._path_line.visible = bool(paths)
-            timeline = None if program is None else Timeline.previewed(program)
-            if program is not None and timeline is not None:
-                self._shown = _Shown(program, timeline, state)
+            if program is not None and program.preview_time > 0.0:
+                self._shown = _Shown(program, state)
 
     def look(self, t: float) -> None:
         """Show arm, objects and water at the time ``t`` [s] of the preview; hide them at 0."""
@@ -207,18 +199,16 @@ class PreviewNodes:
             shown.look = t
             if not shown.simulated:
                 self._simulate(shown)
+            state = shown.at(t)
+            if state is None:
+                return
             if self._ghost is None:
                 self._ghost = GhostNodes(
                     self._server, self._robot, "/path/ghost", LOOK, LOOK_OPACITY
                 )
-            state = shown.at(t)
-            posture = shown.timeline.at(t) if state is None else (state.q, state.gripper)
-            self._ghost.move(self._robot.joint_values(*posture))
+            self._ghost.move(self._robot.joint_values(state.q, state.gripper))
             self._ghost.show(True, LOOK)
-            if state is not None:
-                self._objects().show(self._session(), shown.start, state)
-            elif self._ghost_scene is not None:
-                self._ghost_scene.hide()
+            self._objects().show(self._session(), shown.start, state)
 
     def begin(self) -> None:
         """Hide the ghost, because the program runs and the arm itself shows it."""
@@ -237,8 +227,7 @@ class PreviewNodes:
 
         def simulate() -> None:
             try:
-                steps = moments(shown.program, shown.timeline, self._session(), shown.start)
-                for moment in steps:
+                for moment in moments(shown.program, self._session(), shown.start):
                     if self._shown is not shown:
                         return
                     shown.moments.append(moment)
@@ -246,15 +235,10 @@ class PreviewNodes:
                 log.debug("The preview ends before the program: %s", error)
             except Exception:
                 log.exception("The preview met an error.")
-            with self._lock:
-                if self._shown is shown:
-                    self._objects().prepare(shown.held)
             if shown.look > 0.0:
                 self.look(shown.look)
 
-        # A preview without objects needs no simulation.
-        if shown.start.objects:
-            threading.Thread(target=simulate, name="preview", daemon=True).start()
+        threading.Thread(target=simulate, name="preview", daemon=True).start()
 
     def _objects(self) -> GhostScene:
         if self._ghost_scene is None:
@@ -274,7 +258,6 @@ class _Shown:
 
     Attributes:
         program: the program.
-        timeline: its motions.
         start: the state in which it begins.
         moments: the simulated states so far, in the order of their times.
         simulated: whether the simulation has begun.
@@ -282,52 +265,29 @@ class _Shown:
     """
 
     program: Program
-    timeline: Timeline
     start: State
     moments: list[Moment] = field(default_factory=list)
     simulated: bool = False
     look: float = 0.0
 
-    @property
-    def held(self) -> list[SceneObject]:
-        """The objects that are held at some time, each once."""
-        states = (moment.state for moment in self.moments)
-        objects = {
-            scene_object.name: scene_object
-            for state in states
-            for scene_object in state.objects
-            if scene_object.held
-        }
-        return list(objects.values())
-
     def at(self, t: float) -> State | None:
-        """Return the simulated state at ``t`` [s]; None if it is not known."""
+        """Return the newest simulated state up to ``t`` [s]; None before the first."""
         number = bisect_right(self.moments, t, key=lambda moment: moment.t)
-        if not 0 < number <= len(self.moments) or t > self.moments[-1].t + NEWEST:
-            return None
-        return self.moments[number - 1].state
+        return self.moments[number - 1].state if number else None
 
 
 def _tool_paths(arm: MountedArm, program: Program, tool: str) -> list[FloatArray]:
-    """Return the tool's path of each plan, (PATH_SAMPLES, 2, 3) in the base frame [m].
-
-    The paths of all alternatives are among them.
-    """
+    """Return the tool's path of each expected plan, (PATH_SAMPLES, 2, 3) in the base frame [m]."""
     paths: list[FloatArray] = []
-    # The tool frame at the beginning of each task that may be executed.
-    tools = {program.first: tool}
-    for number, task in enumerate(program.tasks):
-        if number not in tools:
-            continue
-        tool = tools[number]
-        if isinstance(task.action, UseTool):
-            tool = task.action.name
-        elif isinstance(task.action, FollowPlan):
-            chain = arm.chain_to(tool)
-            postures = task.action.plan.postures(PATH_SAMPLES + 1, task.action.tau)
-            points = [(arm.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
-            paths.append(np.stack((points[:-1], points[1:]), axis=1))
-        tools.update(dict.fromkeys(program.next(number), tool))
+    for task in program.schedule:
+        match program.tasks[task.number].action:
+            case GiveCommand(command=cmd.Tool(name=name)):
+                tool = name
+            case FollowPlan(plan=plan, tau=tau):
+                chain = arm.chain_to(tool)
+                postures = plan.postures(PATH_SAMPLES + 1, tau)
+                points = [(arm.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
+                paths.append(np.stack((points[:-1], points[1:]), axis=1))
     return paths
 
 

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 import msgspec
 
@@ -24,8 +23,12 @@ from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.continuation import Interruption
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
-from katana450.extensions.programs.run.simulation import Timeline
-from katana450.extensions.programs.server import state_line
+from katana450.extensions.programs.server import page_state
+from katana450.extensions.programs.server.page_state import (
+    RunNews,
+    planned_steps,
+    steps_of,
+)
 from katana450.extensions.programs.server.program_participant import (
     FollowRun,
     LeftTool,
@@ -38,8 +41,6 @@ from katana450.extensions.programs.server.program_planner import (
     Planning,
     ProgramPlanner,
 )
-from katana450.extensions.programs.server.state_line import RunNews
-from katana450.extensions.programs.server.step_list import ListedStep, planned_steps, steps_of
 from katana450.server.api import answers
 from katana450.server.api import program_requests as requests
 from katana450.server.api.program_requests import ProgramOrder
@@ -49,22 +50,6 @@ from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.runner import Runner, StatusLine
 
 log = logging.getLogger(__name__)
-
-
-class _Preview(NamedTuple):
-    """The preview of a planned program.
-
-    Attributes:
-        program: the program.
-        steps: its steps.
-        seconds: its duration [s]; 0 if it cannot be shown by time.
-        look: the time that is shown [s]; 0 for none.
-    """
-
-    program: Program
-    steps: tuple[ListedStep, ...]
-    seconds: float
-    look: float = 0.0
 
 
 class ProgramRunner(Runner):
@@ -83,7 +68,8 @@ class ProgramRunner(Runner):
         self._is_news = False  # Whether no other command followed the end of a run or planning.
         self._runs_as: ProgramParticipant | None = None
         self._run: Run | None = None
-        self._preview: _Preview | None = None
+        # The program whose preview was looked at last, and the time [s].
+        self._looked: tuple[Program | None, float] = None, 0.0
         self.show_preview: Callable[[], object] = lambda: None
         """Called in the server's thread when ``look_time`` has changed by a request."""
         self.follow_run: FollowRun = lambda *_: None
@@ -197,8 +183,8 @@ class ProgramRunner(Runner):
             case ProgramOrder.RUN | ProgramOrder.RESUME:
                 return self._runs_as.send(cmd.Resume())
             case ProgramOrder.STEP:
-                self._run, commands = runner.stepping(self._run)
-                return self._runs_as.send(*commands)
+                self._run = replace(self._run, single=True)
+                return self._runs_as.send(cmd.Resume())
             case ProgramOrder.PAUSE:
                 return self._runs_as.send(cmd.Pause())
             case ProgramOrder.END:
@@ -296,30 +282,20 @@ class ProgramRunner(Runner):
         program, progress = self.program, self.progress()
         if program is None:
             return answers.ProgramPlan(text=self.planner.text, program=progress)
-        preview, look = self._preview_of(program), self.look_time
+        look = self.look_time
         return answers.ProgramPlan(
             text=self.planner.text,
             program=progress,
-            steps=planned_steps(preview.steps, progress, look),
-            seconds=0.0 if self.begun else preview.seconds,
+            steps=planned_steps(steps_of(program), progress, look),
+            seconds=0.0 if self.begun else program.preview_time,
             look=look,
         )
 
     @property
     def look_time(self) -> float:
         """Time [s] of the preview that the scene shows; 0 for none, as while the program runs."""
-        preview = self._preview
-        shown = preview is not None and preview.program is self.program and not self.begun
-        return preview.look if preview is not None and shown else 0.0
-
-    def _preview_of(self, program: Program) -> _Preview:
-        """Return what is known of the preview of ``program``, which is planned."""
-        preview = self._preview
-        if preview is None or preview.program is not program:
-            timeline = Timeline.previewed(program)
-            seconds = 0.0 if timeline is None else timeline.span
-            preview = self._preview = _Preview(program, steps_of(program), seconds)
-        return preview
+        program, t = self._looked
+        return t if program is self.program and not self.begun else 0.0
 
     def _look_at(self, participant: Participant, t: float) -> None:
         """Show the time ``t`` [s] of the preview. Raises LeaseError if there is none."""
@@ -328,16 +304,15 @@ class ProgramRunner(Runner):
             raise LeaseError("The program runs, and the arm itself shows it.")
         program = self.planner.require().program
         assert program is not None
-        preview = self._preview_of(program)
-        if preview.seconds <= 0.0 or self.begun:
+        if program.preview_time <= 0.0 or self.begun:
             raise LeaseError("There is no preview. Plan the program from its beginning first.")
-        self._preview = preview._replace(look=min(t, preview.seconds))
+        self._looked = program, min(t, program.preview_time)
         self.show_preview()
 
     def status_line(self, state: State, line: StatusLine, reader: Person | None) -> StatusLine:
         """Return the line for the program in place of ``line``."""
         news = RunNews(self._run, reader) if self._is_news else None
-        return state_line.status_line(state, line, self.progress(), news, waits=self.waits)
+        return page_state.status_line(state, line, self.progress(), news, waits=self.waits)
 
     def names(self, person: Person) -> bool:
         """Return whether the line says what ``person`` has done."""
@@ -349,7 +324,7 @@ class ProgramRunner(Runner):
         if not self.owns(participant):
             return ()
         free = self.hub.stopped is None and self.hub.lease.holder in (None, participant.person)
-        return state_line.orders(self.progress(), may_begin=free)
+        return page_state.orders(self.progress(), may_begin=free)
 
     def _start_planned(self) -> None:
         """Carry out the order that waits for the end of the planning."""
