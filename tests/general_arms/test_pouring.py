@@ -18,13 +18,12 @@ from katana450.errors import InputError
 from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import PlanContext
-from katana450.extensions.programs.building.vessel_turn import UNDERSIDES
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.curves import PoseTurn
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.simulation import Planned, Simulation, run_by_clock
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.steps.pouring import POURING
+from katana450.extensions.programs.steps.pouring import POURING, UNDERSIDES
 from katana450.extensions.recording.codec import Codec
 from katana450.extensions.recording.forms import FormError
 from katana450.maths.geometry import se3, so3

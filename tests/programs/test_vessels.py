@@ -41,7 +41,7 @@ BOTH = """\
 - set_down
 - pick: glass
 - line: {by: {z: 60}}
-- pour: {from: glass, into: basin}
+- pour: basin
 - set_down
 """
 
@@ -112,7 +112,10 @@ def test_nothing_is_spilled_beside_a_glass(
     ("steps", "said"),
     [
         ("- pour: {into: glass}", "glass has room for 192.2 ml, which is less than the 200.0 ml"),
-        ("- pour: {from: glass, into: basin}", "The glass is not in the hand: `grasp: glass`"),
+        (
+            "- set_down\n- pour: basin",
+            "No vessel is in the hand: `grasp` the cup or a vessel first",
+        ),
         ("- pour: {into: cup}", "cup is in the hand: name what stands below it"),
         ("- set_down\n- pick: {object: glass, side: above}", "a vessel is grasped from the front"),
         ("- place: {on: glass}", "glass is open at its top and cannot carry cup"),

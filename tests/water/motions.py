@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from katana450.extensions.programs.building.vessel_turn import spill_tilt
+from katana450.extensions.programs.steps.pouring import spill_tilt
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder

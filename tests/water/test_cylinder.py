@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.extensions.programs.building.vessel_turn import spill_tilt
+from katana450.extensions.programs.steps.pouring import spill_tilt
 from katana450.maths.water.cylinder import Cylinder
 from tests.geometry.strategies import repeatable
 

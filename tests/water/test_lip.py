@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.extensions.programs.building.vessel_turn import flow_at, spill_tilt, tilt_for
+from katana450.extensions.programs.steps.pouring import flow_at, spill_tilt, tilt_for
 from katana450.maths.water.flow import WaterFlow
 from katana450.maths.water.lip import DISCHARGE, left_over, viscous_flow, weir_flow
 from katana450.maths.water.units import DENSITY, GRAVITY, MILLILITRE, ML, VISCOSITY
