@@ -40,7 +40,7 @@ from katana450.extensions.programs.planning.curves import (
     ToolTurn,
     TurnedCurve,
 )
-from katana450.extensions.programs.planning.trajectory_path import TrajectoryPath
+from katana450.extensions.programs.steps.trajectory import TrajectoryPath
 from katana450.extensions.recording.former_forms import CLASSES, FORMER, command_form, upgraded
 from katana450.extensions.recording.forms import (
     MAX_INT,

@@ -16,10 +16,8 @@ from katana450.arm.control.objects.gripper_model import GripperModel
 from katana450.arm.control.state.state import Status
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import MAX_BYTES, MAX_VALUES
-from katana450.extensions.programs.planning.trajectory_path import CubicSpline
-from katana450.extensions.programs.script.blocks import MAX_STEPS
-from katana450.extensions.programs.script.script import MAX_NAME_LENGTH
-from katana450.extensions.programs.steps.trajectory import MAX_POSTURES, TRAJECTORY
+from katana450.extensions.programs.script.script import MAX_NAME_LENGTH, MAX_STEPS
+from katana450.extensions.programs.steps.trajectory import MAX_POSTURES, TRAJECTORY, CubicSpline
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import check_whole
 from katana450.extensions.recording.files.table import rows_from
