@@ -1,4 +1,7 @@
-"""The immutable state of a plan: the arm as predicted, and the actions planned so far."""
+"""The immutable state of a plan: the arm as predicted, and the actions planned so far.
+
+The session's own rules move the fingers, so that a run does what was planned.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +13,25 @@ from typing import TypeVar
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.commands.commands import Command, Joints
+from katana450.arm.control.commands.commands import Command, Gripper, Joints
 from katana450.arm.control.session.plans import path_to, plan_along
 from katana450.arm.control.session.session import TOOL_SPEED, Session
+from katana450.arm.control.state.messages import part
 from katana450.arm.control.state.modes import IDLE
 from katana450.arm.control.state.scene_objects import SceneObject, named
-from katana450.arm.control.state.state import State
+from katana450.arm.control.state.state import Reason, State
 from katana450.errors import InputError
-from katana450.extensions.programs.building.actions import Action, FollowPlan, MoveFingers
-from katana450.extensions.programs.language.step_target import ScriptFrame, StepTarget
-from katana450.extensions.programs.planning.approach import Approach
-from katana450.extensions.programs.planning.curves import Curve
+from katana450.extensions.programs.building.actions import (
+    ACTION_TIMEOUT,
+    Action,
+    FollowPlan,
+    MoveFingers,
+)
+from katana450.extensions.programs.language.scope import ScriptFrame, StepTarget
+from katana450.extensions.programs.planning.curves import Curve, arc_between, line_between
+from katana450.extensions.programs.planning.hand_frames import UP, Approach
 from katana450.extensions.programs.planning.hand_planning import HandPlanning, hand_of
-from katana450.extensions.programs.planning.out_of_reach import unfollowed, unreached
+from katana450.extensions.programs.planning.out_of_reach import unreached
 from katana450.extensions.programs.planning.tool_planning import ToolPlanning
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
@@ -367,13 +376,6 @@ class PlanState:
         frame = ScriptFrame.of(T, in_base=False) if self.frame is None else self.frame
         return unreached(self.planning, self.q, target, branch, frame)
 
-    def unfollowed(self, refused: InputError, curve: Curve, branch: AnyBranch) -> InputError:
-        """Return ``refused`` with the place of ``curve`` that is farthest out of reach."""
-        if self.frame is None or self.given_up:
-            # With another grasp. Only the refusal with the first one is shown.
-            return refused
-        return unfollowed(self.planning, self.q, refused, curve, branch, self.frame)
-
     def branches(self, wanted: AnyBranch | None) -> Sequence[AnyBranch]:
         """Return the branches to try, in their order; only ``wanted`` if it is given."""
         planning = self.planning
@@ -399,3 +401,73 @@ def _check_range(chain: Chain, q: FloatArray) -> None:
         f"Axis {number + 1} would be at {value:.1f} deg, beyond its limit: its range is "
         f"{low:.1f} to {high:.1f} deg."
     )
+
+
+def with_fingers(plan: PlanState, position: float) -> State:
+    """Return the state at rest after the fingers were moved to ``position`` [rad or m].
+
+    They may end before it on an object that they close on. Raises InputError if something else
+    stops them.
+    """
+    state = plan.after(Gripper(position), round(ACTION_TIMEOUT / TICK))
+    if state.gripper_setpoint == state.gripper_goal:
+        return state
+    unit, scale = finger_unit(plan)
+    goal, end = (f"{value / scale:.1f}" for value in (position, state.gripper_setpoint))
+    raise InputError(
+        f"The fingers would stop at {end} {unit} on their way to {goal} {unit}: "
+        f"{_obstacle(plan, state)}"
+    )
+
+
+def finger_unit(plan: PlanState) -> tuple[str, float]:
+    """Return the unit of finger positions for people, and its size [m or rad]."""
+    return ("mm", 1e-3) if plan.plan_context.arm.gripper.slides else ("deg", math.radians(1.0))
+
+
+def _obstacle(plan: PlanState, state: State) -> str:
+    """Return what stops the fingers in ``state``, and a remedy."""
+    contacts = [entry.parts for entry in state.findings if entry.reason is Reason.CONTACT]
+    parts = contacts[0] if contacts else None
+    world = plan.plan_context.session.world_at(state)
+    # Objects that can be held are touched without a finding.
+    nearest = None if world is None else world.nearest(state.x_setpoint)
+    if parts is None and nearest is not None:
+        parts = nearest.parts
+    if parts is None:
+        return f"they need more than {ACTION_TIMEOUT:g} s. Move them less far."
+    names = {entry.name for entry in state.objects}
+    finger, obstacle = sorted(parts, key=lambda name: name in names)
+    remedy = "Choose another height or pitch of the hand."
+    if obstacle in names:
+        remedy = f"Leave more room beside {part(obstacle)}, or come from another side."
+    return f"{part(finger)} would meet {part(obstacle)}. {remedy}"
+
+
+APPROACHES = (0.09, 0.07, 0.055, 0.045, 0.035)
+"""[m] Distances of approach and retreat of the open fingers, tried from the farthest."""
+
+
+def carry(plan: PlanState, to: ToolTarget, name: str) -> PlanState:
+    """Return ``plan`` with the way of the tool to ``to``: vertically, about axis 1, then radially.
+
+    The tool keeps its present orientation up to the last part. An object that is held upright stays
+    upright unless ``to`` has another orientation.
+    """
+    present, hand = plan.target, plan.hand
+    start = math.atan2(present.position[1], present.position[0])
+    end = math.atan2(to.position[1], to.position[0])
+    radius = math.hypot(present.position[0], present.position[1])
+    z = float(to.position[2])
+    raised = present.moved(present.position * (1, 1, 0) + UP * max(z, present.position[2]))
+    turn = hand.way_round(start, end)
+    position = np.array((radius * math.cos(end), radius * math.sin(end), raised.position[2]))
+    over = hand.turned(raised, position, turn)
+    curves: list[Curve] = []
+    if (raised.position != present.position).any():
+        curves.append(line_between(present, raised))
+    if abs(turn) > JOIN_TOLERANCE:
+        curves.append(arc_between(np.zeros(3), UP, turn, 0.0, raised, over))
+    if max(over.apart(to)) > JOIN_TOLERANCE:
+        curves.append(line_between(over, to))
+    return plan.lead(curves, name) if curves else plan

@@ -1,4 +1,4 @@
-"""Messages about places and paths out of reach: by how much, what binds, and the nearest place."""
+"""Messages about places out of reach: by how much, what binds, and the nearest place."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from katana450.arm.control.state.messages import axis_names, joint_unit
-from katana450.errors import BlockedError, InputError, PathError
 from katana450.extensions.programs.language.kinds import XYZ
-from katana450.extensions.programs.language.step_target import ScriptFrame
-from katana450.extensions.programs.planning.curves import Curve
+from katana450.extensions.programs.language.scope import ScriptFrame
 from katana450.extensions.programs.planning.tool_planning import EXACT, ToolPlanning
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
@@ -26,8 +24,6 @@ from katana450.maths.kinematics.projection import (
     Projection,
 )
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.checkpoint import checkpoint
-from katana450.maths.planning.jet import Jet
 from katana450.tolerances import LIMIT_SLACK
 
 STEP = 0.1
@@ -35,9 +31,6 @@ STEP = 0.1
 
 WIDER = math.radians(5.0)
 """[rad] Angle by which a limit is widened to find out whether it binds."""
-
-SAMPLES = 65
-"""Number of places of a path that are compared."""
 
 CLEAR_TURN = math.radians(1.0)
 """[rad] Error of the orientation that is reported beside one of the position."""
@@ -135,49 +128,6 @@ def unreached(
         # The nearest posture takes it, but on another branch.
         return f"{why}: it is reached on the branch {moved.projection.branch} only.{remedy}"
     return f"{why}: {missed}, because {binding(planning, moved)}.{remedy}"
-
-
-def unfollowed(
-    planning: ToolPlanning,
-    q: FloatArray,
-    refused: InputError,
-    curve: Curve,
-    branch: AnyBranch,
-    frame: ScriptFrame,
-) -> InputError:
-    """Return ``refused`` with the place of the path that is farthest out of reach.
-
-    A refusal for a contact, or for another reason than the path, is returned unchanged.
-
-    Args:
-        planning: that of the tool.
-        q: (n,) joint angles at the start of the path [rad].
-        refused: why the tool cannot follow the path.
-        curve: the path.
-        branch: the branch of the joints on the path.
-        frame: the frame of the script.
-    """
-    if isinstance(refused, BlockedError) or not isinstance(refused, PathError):
-        return refused
-    worst: tuple[float, NearestPlace] | None = None
-    for sigma in np.linspace(0.0, 1.0, SAMPLES).tolist():
-        checkpoint()
-        target = curve.at(Jet.variable(sigma)).target
-        place = nearest_place(planning, q, target, branch, planning.priorities[1])
-        missed = place.projection.position_error
-        if worst is None or missed > worst[1].projection.position_error:
-            worst = sigma, place
-    assert worst is not None
-    sigma, place = worst
-    missed = place.projection.position_error
-    if missed <= _smallest(place.target):
-        return refused
-    text = (
-        f"{refused.text} Farthest out of reach is {frame.words(place.target.position)}, "
-        f"{100.0 * sigma:.0f} % along it: {millimetres(missed)}, "
-        f"because {binding(planning, place)}."
-    )
-    return PathError(text, refused.point, parts=refused.parts)
 
 
 def binding(planning: ToolPlanning, nearest: NearestPlace) -> str:
