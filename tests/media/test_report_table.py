@@ -17,9 +17,8 @@ from katana450.extensions.export.playback import load_motion
 from katana450.extensions.media import figures
 from katana450.extensions.media.measures import PathTrace, PourRecord
 from katana450.extensions.media.report import Report
-from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
-from katana450.extensions.programs.script.measures import OF_A_MEASURED_ARM
+from katana450.extensions.programs.script.measures import OF_A_MEASURED_ARM, MeasuredRun
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH

@@ -5,14 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.run.measured_run import MeasuredRun, nearest_points, path_of
 from katana450.extensions.programs.run.simulation import (
     Planned,
     Simulation,
     plan_script,
     run_by_clock,
 )
-from katana450.extensions.programs.script.measures import MEASURES, OF_A_MEASURED_ARM
+from katana450.extensions.programs.script.measures import (
+    MEASURES,
+    OF_A_MEASURED_ARM,
+    MeasuredRun,
+    nearest_points,
+    path_of,
+)
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.real_arm.plant.axis import KATANA450
 from katana450.extensions.real_arm.plant.driver import PlantDriver
@@ -68,6 +73,9 @@ def test_known_lag_and_errors_are_found(line: tuple[Planned, Simulation, Measure
         for s in states
     ]
     assert run.values["tool_tracking_error_mm"] == pytest.approx(1e3 * max(apart), rel=1e-3)
+    still = MeasuredRun.of(plan.robot.require_arm(), states[-5:])
+    assert still is not None
+    assert still.values["tracking_lag_ms"] is None
 
 
 def test_distances_are_those_from_the_line(
@@ -137,10 +145,3 @@ def test_plant_lags_by_its_delay_and_friction() -> None:
     assert simulation.measured is not None
     # The setpoints are apart from what is measured.
     assert np.abs(simulation.measured - simulation.q).max() > 1e-3
-
-
-def test_unmoved_arm_has_no_lag(line: tuple[Planned, Simulation, MeasuredRun]) -> None:
-    plan, simulation, _ = line
-    still = MeasuredRun.of(plan.robot.require_arm(), simulation.states[-5:])
-    assert still is not None
-    assert still.values["tracking_lag_ms"] is None

@@ -12,8 +12,8 @@ from typing import Any, Concatenate, ParamSpec
 import numpy as np
 
 from katana450.extensions.media.measures import PathTrace, PourRecord
-from katana450.extensions.programs.run.measured_run import Deviation, MeasuredRun
 from katana450.extensions.programs.run.simulation import Simulation
+from katana450.extensions.programs.script.measures import Deviation, MeasuredRun
 from katana450.maths.geometry.arrays import FloatArray
 
 RIGHT: dict[str, Any] = {"ha": "right", "va": "top"}

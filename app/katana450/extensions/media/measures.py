@@ -14,9 +14,14 @@ from itertools import pairwise
 import numpy as np
 
 from katana450.extensions.programs.building.actions import FollowPlan, Task
-from katana450.extensions.programs.run.measured_run import path_fraction, path_of, run_errors
 from katana450.extensions.programs.run.simulation import Simulation
-from katana450.extensions.programs.script.measures import motion_measures, water_measures
+from katana450.extensions.programs.script.measures import (
+    motion_measures,
+    path_fraction,
+    path_of,
+    run_errors,
+    water_measures,
+)
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.collision.clearance import MIN_CLEARANCE

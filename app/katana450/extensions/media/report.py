@@ -27,9 +27,14 @@ from katana450.extensions.media.measures import (
     measurements,
     traced_paths,
 )
-from katana450.extensions.programs.run.measured_run import MeasuredRun, path_fraction
 from katana450.extensions.programs.run.simulation import Simulation
-from katana450.extensions.programs.script.measures import MEASURES, title_of, unit_of
+from katana450.extensions.programs.script.measures import (
+    MEASURES,
+    MeasuredRun,
+    path_fraction,
+    title_of,
+    unit_of,
+)
 from katana450.extensions.programs.script.script import Script
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

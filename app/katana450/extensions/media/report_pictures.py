@@ -19,8 +19,8 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.extensions.media.picture import Camera, Item, picture
 from katana450.extensions.media.stage import RenderStage
-from katana450.extensions.programs.run.measured_run import commanded_errors, path_of
 from katana450.extensions.programs.run.simulation import Simulation
+from katana450.extensions.programs.script.measures import commanded_errors, path_of
 from katana450.extensions.programs.server.traces import DESIRED, PATH_SAMPLES, coloured
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray

@@ -13,14 +13,15 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import Reason, State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
-from katana450.extensions.programs.planning.trajectory_path import CubicSpline
-from katana450.extensions.programs.run.measured_run import MeasuredRun, run_errors
 from katana450.extensions.programs.script.measures import MEASURES as REPORTED
 from katana450.extensions.programs.script.measures import (
     OF_A_MEASURED_ARM,
+    MeasuredRun,
     motion_measures,
+    run_errors,
     water_measures,
 )
+from katana450.extensions.programs.steps.trajectory import CubicSpline
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import check_whole, recorded_states
 from katana450.extensions.recording.files.table import columns
