@@ -33,6 +33,12 @@ objects:
 """
 
 
+SCENE_OF_THE_SCRIPT = """\
+scene:
+  - {name: post, shape: box, size: [30, 30, 250], pose: [330, 0, 0, 0, 0, 0]}
+"""
+
+
 @pytest.fixture
 def script(tmp_path: Path) -> Path:
     path = tmp_path / "across.yaml"
@@ -89,52 +95,54 @@ def test_scene_that_cannot_be_used_is_named(
 def test_scene_of_the_script_is_used_unless_another_is_given(
     script: Path, post: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    aside = script.parent / "aside.yaml"
-    aside.write_text(POST.replace("[330, 0,", "[330, 300,"), encoding="utf-8")
-    script.write_text(f"scene: {post.name}\n{SCRIPT}", encoding="utf-8")
+    script.write_text(f"{SCENE_OF_THE_SCRIPT}{SCRIPT}", encoding="utf-8")
     assert main(["run", str(script), "--dry-run"]) == 1
     said = capsys.readouterr().err
-    assert f"{script}:6:" in said
+    assert f"{script}:7:" in said
     assert "post" in said
-    assert main(["run", str(script), "--dry-run", "--scene", str(aside)]) == 0
+    post.write_text(POST.replace("[330, 0,", "[330, 300,"), encoding="utf-8")
+    assert main(["run", str(script), "--dry-run", "--scene", str(post)]) == 0
+    assert main(["run", str(script), "--scene", str(post)]) == 1
+    assert "the script has a scene of its own" in capsys.readouterr().err
 
 
-def test_alternatives_are_listed_with_their_beginnings(
+def test_conditions_are_listed_with_the_tasks_that_follow(
     script: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    choice = "  - if: {time: {at_least: 9}, then: [{nudge: {axis: 5, by: 5}}, home]}\n"
+    choice = "  - if: {held: cup, then: [{nudge: {axis: 5, by: 5}}, home]}\n"
     script.write_text(f"{SCRIPT}{choice}  - home\n", encoding="utf-8")
     assert main(["run", str(script), "--dry-run"]) == 0
-    _, _, listed = capsys.readouterr().out.partition("if the time\n")
-    assert listed.startswith("-- then of line 6\nline    6  nudge")
-    assert "\n-- else of line 6\nline    7  home" in listed
+    listed = capsys.readouterr().out
+    match = re.search(r"line    6  if cup in the hand +then (\d+), else (\d+)\n", listed)
+    assert match is not None
+    for number, task in zip(match.groups(), ("line    6  nudge", "line    7  home"), strict=True):
+        assert re.search(rf"^ +{number}  {task}", listed, re.MULTILINE)
     assert re.search(r"^7 steps, about [\d.]+ s", listed, re.MULTILINE)
 
 
 @pytest.mark.long
 def test_report_measures_only_the_alternative_that_was_taken(script: Path, tmp_path: Path) -> None:
     up, down = ("line: {by: {z: 40}}", "line: {by: {z: -25}}")
-    choice = f"  - if: {{time: {{at_least: 1 min}}, then: [{{{up}}}], else: [{{{down}}}]}}\n"
+    choice = f"  - if: {{held: cup, then: [{{{up}}}], else: [{{{down}}}]}}\n"
     script.write_text(f"{SCRIPT}{choice}", encoding="utf-8")
     done = run(script, "--headless", "--report", tmp_path / "out")
     assert done.returncode == 0, done.stderr
-    assert "Line 6, if the time: else." in done.stdout
+    assert "Line 6, if cup in the hand: else." in done.stdout
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert report["path_length_mm"] == pytest.approx(225.0)
-    assert "Line 6, if the time: else." in report["notes"]
+    assert "Line 6, if cup in the hand: else." in report["notes"]
 
 
 @pytest.mark.long
 def test_server_is_started_with_the_scene_of_the_script(script: Path, post: Path) -> None:
-    aside = post.read_text(encoding="utf-8").replace("[330, 0,", "[330, 300,")
-    post.write_text(aside, encoding="utf-8")
-    script.write_text(f"scene: {post.name}\nsteps:\n  - nudge: {{axis: 5, by: 5}}\n", "utf-8")
+    nudge = "steps:\n  - nudge: {axis: 5, by: 5}\n"
+    script.write_text(SCENE_OF_THE_SCRIPT.replace("[330, 0,", "[330, 300,") + nudge, "utf-8")
     url = f"http://127.0.0.1:{free_port()}"
     done = run(script, "--url", url)
     assert done.returncode == 0, done.stderr
-    other = script.parent / "other.yaml"
-    other.write_text(aside.replace("post", "pole"), encoding="utf-8")
-    done = run(script, "--url", url, "--scene", other)
+    script.write_text(nudge, encoding="utf-8")
+    post.write_text(POST.replace("[330, 0,", "[330, 300,"), encoding="utf-8")
+    done = run(script, "--url", url, "--scene", post)
     assert done.returncode == 0, done.stderr
 
 
