@@ -148,19 +148,9 @@ class Wait(Action):
         return min(waited / self.seconds, 1.0)
 
 
-@dataclass(frozen=True)
-class UseTool(Action):
-    """Use the tool frame ``name`` from now on."""
-
-    name: str
-
-    def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
-        """Return the command that selects the tool frame."""
-        return (cmd.Tool(self.name),)
-
-    def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
-        """Return whether the tool frame is selected."""
-        return state.tool == self.name
+def use_tool(name: str) -> GiveCommand:
+    """Return the action to use the tool frame ``name`` from now on."""
+    return GiveCommand(cmd.Tool(name), lambda state: state.tool == name)
 
 
 @dataclass(frozen=True)

@@ -14,25 +14,23 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.planning.approach import (
+from katana450.extensions.programs.planning.hand_frames import (
     ABOVE,
     DOWN,
     FRONT,
     JAW_ROOM,
     LOW,
-    YAW_TOLERANCE,
-    Approach,
-    Widths,
-    fitting,
-    symmetry,
-    widths,
-)
-from katana450.extensions.programs.planning.hand_frames import (
     PLANAR_AXES,
     ROLLING_AXES,
+    YAW_TOLERANCE,
+    Approach,
     ArmPlane,
     GraspFrame,
+    Widths,
+    fitting,
     grasp_frame,
+    symmetry,
+    widths,
 )
 from katana450.extensions.programs.planning.tool_planning import ToolPlanning
 from katana450.maths.geometry import se3, so3

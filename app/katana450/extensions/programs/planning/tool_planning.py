@@ -21,7 +21,7 @@ from katana450.arm.control.state.state import State
 from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError, PathError
 from katana450.extensions.general_arms.pose_equations import PoseEquations, equations_from
-from katana450.extensions.programs.language.step_target import Angles
+from katana450.extensions.programs.language.scope import Angles
 from katana450.extensions.programs.planning.curve_path import CurveSearch, ToolPath
 from katana450.extensions.programs.planning.curves import Curve, line_between
 from katana450.maths.geometry import so3

@@ -6,23 +6,22 @@ each of them, until both are in the same situation, and then once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
-
-import numpy as np
 
 from katana450.arm.control.state.messages import part
 from katana450.errors import InputError, PathError
 from katana450.extensions.programs.building.actions import Action, FollowPlan, SetSpeed, Task
-from katana450.extensions.programs.building.conditions import Condition, Held, ProgramTime
 from katana450.extensions.programs.building.plan_state import (
     EXACT,
     PlanState,
     UntimedPath,
 )
 from katana450.extensions.programs.building.step import (
+    Condition,
     Conditional,
+    Held,
     LocatedStep,
     NumberedStep,
     Step,
@@ -41,13 +40,12 @@ class ConditionalJump(Action):
 
     Attributes:
         condition: the condition.
-        predicted: whether it holds in the state that the planning predicts; None if that is
-            unknown.
+        predicted: whether it holds in the state that the planning predicts.
         then, otherwise: index of the task that follows if it holds, and if it does not.
     """
 
     condition: Condition
-    predicted: bool | None
+    predicted: bool
     then: int
     otherwise: int
 
@@ -77,7 +75,7 @@ class PlannedChoice:
         number: index of the step in the script, from 0.
         located: the step.
         condition: its condition for this arm.
-        predicted: whether it holds in the state that is predicted; None if that is unknown.
+        predicted: whether it holds in the state that is predicted.
         then, otherwise: the steps that follow if it holds, and if it does not.
         used: number of steps of the script that it stands for, the ``if`` and those after it.
     """
@@ -85,7 +83,7 @@ class PlannedChoice:
     number: int
     located: LocatedStep
     condition: Condition
-    predicted: bool | None
+    predicted: bool
     then: PlannedSteps
     otherwise: PlannedSteps
     used: int
@@ -254,16 +252,15 @@ class Compiler:
         line: list[PlannedStep | PlannedChoice] = []
         # The index of the step that grasped the held object, and the plan before that step.
         grasp: tuple[int, PlanState] | None = None
-        refused: Problem | None = None
-        reasons: set[Problem] = set()
+        # The first refusal is that of the grasp which a person expects.
+        refused: ScriptError | None = None
         while (index := sum(planned.used for planned in line)) < end:
             try:
                 planned, ends = self._one(plan, steps, index, end, copies)
             except ScriptError as error:
-                refused = refused or error.problems[0]
-                reasons.add(error.problems[0])
+                refused = refused or error
                 if grasp is None or plan.taken is None or plan.taken.chosen is None:
-                    raise _refusal(plan, refused, reasons) from error
+                    raise refused from error
                 given_up = (*plan.given_up, plan.taken.chosen)
                 number, before_grasp = grasp
                 plan, grasp = replace(before_grasp, given_up=given_up), None
@@ -276,7 +273,6 @@ class Compiler:
             before, plan = plan, ends[0]
             if plan.taken is None:
                 grasp, refused, plan = None, None, replace(plan, given_up=())
-                reasons.clear()
             elif plan.taken is not before.taken:
                 tried_again = plan.taken.chosen is not None and isinstance(planned, PlannedStep)
                 grasp = (len(line) - 1, before) if tried_again else None
@@ -312,8 +308,7 @@ class Compiler:
             condition = step.condition.checked(plan)
         except InputError as error:
             raise _at(located, error) from error
-        unknown = isinstance(condition, ProgramTime)
-        predicted = None if unknown else condition.holds(plan.state, 0.0)
+        predicted = condition.holds(plan.state)
         alternatives = (
             list(numbered(step.then, number + 1)),
             list(numbered(step.otherwise, number + 1 + count(step.then))),
@@ -373,22 +368,6 @@ class Compiler:
                 except InputError as error:
                     raise _at(step.located, error) from error
             yield name, self._plans[id(action)]
-
-
-def _refusal(plan: PlanState, refused: Problem, reasons: Set[Problem]) -> ScriptError:
-    """Return the first refusal, with the other pitches of the grasp that have failed too.
-
-    ``reasons``: the refusals with all pitches. A reason that is the same with each of them has
-    nothing to do with the pitch.
-    """
-    text = refused.text
-    pitches_tried = dict.fromkeys(approach.pitch for approach in plan.given_up)
-    angles = [f"{angle:.0f}" for angle in np.degrees(list(pitches_tried))]
-    at_step = [reason for reason in reasons if reason.line == refused.line]
-    if len(angles) > 1 and len(at_step) > 1:
-        pitches = ", ".join(angles[:-1]) + f" and {angles[-1]}"
-        text += f" No other pitch of the grasp helps: tried {pitches} deg."
-    return ScriptError((replace(refused, text=text),))
 
 
 def _at(located: LocatedStep, error: InputError) -> ScriptError:

@@ -10,7 +10,7 @@ import numpy as np
 from katana450.arm.control.session.goals import START_TOLERANCE
 from katana450.arm.control.state.state import State
 from katana450.errors import BlockedError, InputError
-from katana450.extensions.programs.building.actions import FollowPlan, MoveFingers, Task, UseTool
+from katana450.extensions.programs.building.actions import FollowPlan, MoveFingers, Task, use_tool
 from katana450.extensions.programs.building.plan_state import (
     PlanContext,
     PlanState,
@@ -100,7 +100,7 @@ def continued(interruption: Interruption, plan_context: PlanContext, state: Stat
     step = program.titles[task.number]
     added = [replace(task, name=f"{step}: speed", action=run.speed, after=None)]
     if interruption.situation.tool not in ("", state.tool):
-        tool = UseTool(interruption.situation.tool)
+        tool = use_tool(interruption.situation.tool)
         added.append(replace(task, name=f"{step}: tool", action=tool, after=None))
     if float(np.abs(state.setpoint - q).max()) > START_TOLERANCE:
         way = _way(plan_context, state, q)

@@ -107,7 +107,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     run = replace(run, held=state.held is not None)
     if not done:
         return run, ()
-    number = program.next_in(run.number, state, run.elapsed)
+    number = program.next(run.number, state)
     if isinstance(task.action, ConditionalJump):
         run = replace(run, choices=(*run.choices, (task.number, number == task.action.then)))
     if number == len(program.tasks):
@@ -184,11 +184,6 @@ def stopped(run: Run, why: str) -> tuple[Run, tuple[cmd.Command, ...]]:
 def ended(run: Run, phase: Phase, why: str) -> Run:
     """Return the run with ``phase`` and ``why``; a run that has ended stays unchanged."""
     return run if run.phase is not Phase.RUNNING else replace(run, phase=phase, why=why)
-
-
-def stepping(run: Run) -> tuple[Run, tuple[cmd.Command, ...]]:
-    """Return the run that continues to the end of the step, and its commands."""
-    return replace(run, single=True), (cmd.Resume(),)
 
 
 def task_fraction(program: Program, run: Run, state: State) -> float:

@@ -14,14 +14,17 @@ from katana450.arm.control.state.messages import part
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import Reason, State
 from katana450.errors import InputError
-from katana450.extensions.programs.building.actions import MoveFingers, UseTool
-from katana450.extensions.programs.building.conditions import Held
-from katana450.extensions.programs.building.hand_motions import APPROACHES, with_fingers
-from katana450.extensions.programs.building.plan_state import GraspInfo, PlanState
-from katana450.extensions.programs.building.step import Conditional, Step
+from katana450.extensions.programs.building.actions import MoveFingers, use_tool
+from katana450.extensions.programs.building.plan_state import (
+    APPROACHES,
+    GraspInfo,
+    PlanState,
+    with_fingers,
+)
+from katana450.extensions.programs.building.step import Conditional, Held, Step
 from katana450.extensions.programs.language.kinds import Object, angle, choice, millimetres
-from katana450.extensions.programs.planning.approach import ABOVE, DOWN, FRONT, LOW, Approach
 from katana450.extensions.programs.planning.curves import line_between
+from katana450.extensions.programs.planning.hand_frames import ABOVE, DOWN, FRONT, LOW, Approach
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
@@ -115,7 +118,7 @@ class Grasp(Step, word="grasp"):
             plan.plan_context.arm.chain_to(hand.tool)
             plan = plan.with_action(
                 f"grasp {self.name}: tool {hand.tool}",
-                UseTool(hand.tool),
+                use_tool(hand.tool),
                 replace(plan.state, tool=hand.tool),
             )
         opened = plan.plan_context.arm.gripper.opened

@@ -15,13 +15,16 @@ from katana450.arm.control.objects.support import check_carried, is_over, surfac
 from katana450.arm.control.state.scene_objects import MAX_COORDINATE, SceneObject
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import MoveFingers
-from katana450.extensions.programs.building.hand_motions import APPROACHES, carry, with_fingers
-from katana450.extensions.programs.building.plan_state import PlanState
+from katana450.extensions.programs.building.plan_state import (
+    APPROACHES,
+    PlanState,
+    carry,
+    with_fingers,
+)
 from katana450.extensions.programs.building.step import Step
-from katana450.extensions.programs.language.kinds import NAME, ObjectName
-from katana450.extensions.programs.language.places import SPOT, Spot
-from katana450.extensions.programs.planning.approach import UP
+from katana450.extensions.programs.language.kinds import NAME, SPOT, ObjectName, Spot
 from katana450.extensions.programs.planning.curves import line_between
+from katana450.extensions.programs.planning.hand_frames import UP
 from katana450.extensions.programs.steps.grasp import Grasp
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray

@@ -11,7 +11,6 @@ from katana450 import tolerances
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.commands import MIN_SPEED
 from katana450.arm.control.objects.support import check_carried
-from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.free_place import girth
@@ -19,11 +18,10 @@ from katana450.extensions.programs.building.actions import (
     GiveCommand,
     MoveFingers,
     SetSpeed,
-    UseTool,
     Wait,
+    use_tool,
 )
-from katana450.extensions.programs.building.hand_motions import finger_unit, with_fingers
-from katana450.extensions.programs.building.plan_state import PlanState
+from katana450.extensions.programs.building.plan_state import PlanState, finger_unit, with_fingers
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.declaration import Kind
 from katana450.extensions.programs.language.kinds import (
@@ -132,7 +130,7 @@ class Tool(Step, word="tool"):
         """Append the change of the tool frame. Raises InputError if it does not exist."""
         plan.plan_context.arm.chain_to(self.name)
         return plan.with_action(
-            f"tool {self.name}", UseTool(self.name), replace(plan.state, tool=self.name)
+            f"tool {self.name}", use_tool(self.name), replace(plan.state, tool=self.name)
         )
 
 
@@ -195,16 +193,11 @@ class Put(Step, word="put"):
         put = replace(scene_object, T=T)
         check_carried(plan.plan_context.session.environment.table, plan.state.objects, put)
         for other in plan.state.objects:
-            if other.name != scene_object.name and _overlap(put, other):
+            apart = float(np.linalg.norm(put.T[:2, 3] - other.T[:2, 3]))
+            if other.name != scene_object.name and apart < girth(put) + girth(other):
                 raise InputError(f"{self.name} would stand in {other.name}.")
         command = cmd.PlaceObject(put)
         placed = GiveCommand(
             command, lambda state: any(np.array_equal(other.T, T) for other in state.objects)
         )
         return plan.with_action(f"put {self.name}", placed, plan.after(command, ticks=1))
-
-
-def _overlap(one: SceneObject, other: SceneObject) -> bool:
-    """Return whether two objects on the table overlap, each approximated by a circle."""
-    apart = float(np.linalg.norm(one.T[:2, 3] - other.T[:2, 3]))
-    return apart < girth(one) + girth(other)
