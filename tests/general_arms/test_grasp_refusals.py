@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.planning.approach import Approach
+from katana450.extensions.programs.planning.hand_frames import Approach
 from katana450.extensions.programs.planning.hand_planning import hand_of
 from katana450.maths.geometry import so3
 from tests.general_arms.chain_urdf import chain_urdf

@@ -9,8 +9,8 @@ import pytest
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.errors import InputError
+from katana450.extensions.programs.language.scope import Angles
 from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.language.step_target import Angles
 from katana450.extensions.programs.planning.curve_path import PosePath
 from katana450.extensions.recording.codec import Codec
 from katana450.extensions.recording.forms import json_form, json_text

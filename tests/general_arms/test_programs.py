@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.extensions.programs.building.plan_state import UntimedPath
-from katana450.extensions.programs.language.step_target import StepTarget
+from katana450.extensions.programs.language.scope import StepTarget
 from katana450.extensions.programs.planning.curve_path import PosePath
 from katana450.extensions.programs.steps.moves import Home, Joints, Move, Nudge, Via
 from katana450.maths.geometry import so3

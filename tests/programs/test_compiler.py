@@ -151,14 +151,5 @@ def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: St
 @pytest.mark.usefixtures("untimed")
 def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
     text = pour_text(basin=NEAR).replace("grasp: cup", "grasp: {object: cup, pitch: 30}")
-    with pytest.raises(InputError, match="cannot be emptied into basin") as refused:
+    with pytest.raises(InputError, match="cannot be emptied into basin"):
         layout(stage, text).tasks()
-    assert "other pitch" not in str(refused.value)
-
-
-@pytest.mark.long
-@pytest.mark.usefixtures("untimed")
-def test_pitches_that_were_tried_are_reported(stage: Stage) -> None:
-    with pytest.raises(InputError, match=r"other pitch .* tried 30, .* and \d+ deg") as refused:
-        layout(stage, pour_text(basin=(740.0, 600.0))).tasks()
-    assert "with a pitch of 30.0 deg" in str(refused.value)

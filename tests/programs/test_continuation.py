@@ -19,7 +19,7 @@ from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.continuation import RETURN, Interruption, continued
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
-from katana450.extensions.programs.server.step_list import steps_of
+from katana450.extensions.programs.server.page_state import steps_of
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

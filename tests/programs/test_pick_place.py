@@ -13,7 +13,7 @@ from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan, Task
 from katana450.extensions.programs.building.plan_state import PlanState
-from katana450.extensions.programs.language.places import Spot
+from katana450.extensions.programs.language.kinds import Spot
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import Program

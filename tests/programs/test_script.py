@@ -8,12 +8,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from katana450.extensions.programs.language.scope import StepTarget
 from katana450.extensions.programs.language.source import MAX_BYTES, MAX_DEPTH, Problem, ScriptError
-from katana450.extensions.programs.language.step_target import StepTarget
-from katana450.extensions.programs.script.blocks import MAX_STEPS
-from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.steps.moves import Move
-from katana450.extensions.programs.steps.tool_moves import Circle, Line
+from katana450.extensions.programs.script.script import MAX_STEPS, parse
+from katana450.extensions.programs.steps.moves import Circle, Line, Move
 
 GOOD = """\
 name: Try

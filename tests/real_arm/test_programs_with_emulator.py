@@ -10,8 +10,8 @@ import pytest
 import katana450.extensions.programs
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.arm.control.state.state import State
-from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.programs.run.simulation import plan_script, simulated
+from katana450.extensions.programs.script.measures import MeasuredRun
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError
 from katana450.extensions.real_arm.codec.requests import ArmRequest

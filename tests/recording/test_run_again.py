@@ -19,9 +19,9 @@ from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.planning.trajectory_path import CubicSpline
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.steps.trajectory import CubicSpline
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import (
