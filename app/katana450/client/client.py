@@ -243,8 +243,7 @@ class AsyncClient(
         """Plan and run a script; return the state at its end.
 
         Args:
-            script: its text, such as ``str(program)``, or its file. A script that names files
-                beside it is run by ``katana450 run``, which sends them too.
+            script: its text, such as ``str(program)``, or its file.
             speed: fraction of the script's own speed.
 
         Raises:

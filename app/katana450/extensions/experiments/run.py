@@ -18,7 +18,7 @@ from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
 from katana450.client import Client, RefusedError, connect
-from katana450.client.asynchronous import PROGRESS_RATE, UNPLANNED_STATUSES, is_over
+from katana450.client.client import PROGRESS_RATE, UNPLANNED_STATUSES, is_over
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, InputError, KatanaError
 from katana450.extensions.importers.formats.scene_file import load_initial_scene

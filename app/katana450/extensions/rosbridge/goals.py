@@ -25,7 +25,7 @@ import numpy as np
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands.act import MAX_WAIT
 from katana450.errors import InputError, KatanaError
-from katana450.extensions.programs.planning.trajectory_path import MIN_INTERVAL
+from katana450.extensions.programs.steps.trajectory import MIN_INTERVAL
 from katana450.extensions.rosbridge.protocol import (
     Fields,
     FollowJointTrajectory,
