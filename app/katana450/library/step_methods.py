@@ -104,7 +104,7 @@ def _method(word: str, step: type[Step]) -> Callable[..., None]:
     return method
 
 
-METHODS = {word: step for word, step in STEPS.items() if word != "move"}
+METHODS = {word: STEPS[word] for word in sorted(STEPS) if word != "move"}
 """Class of the step of each method. A `ScriptWriter` moves by a method of its own."""
 
 

@@ -1,4 +1,4 @@
-"""How a hand may come to an object, where its fingers meet, and the plane of a short arm.
+"""Approaches of a hand to an object, the frame of its fingers, and the plane of a short arm.
 
 The grasp frame follows from the bodies and joints of the fingers, however they are named. An arm
 with fewer than six axes moves its hand in a plane.

@@ -1,4 +1,4 @@
-"""What the page shows of a program: the state line, its buttons, and the list of its steps."""
+"""State line, buttons and list of steps that the page shows of a program."""
 
 from __future__ import annotations
 
