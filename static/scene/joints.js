@@ -5,12 +5,11 @@ import { button, html, signed } from "../instruments/shape.js";
 import { readState } from "../server.js";
 import { Glow, shapesOf } from "./glow.js";
 import { Grab } from "./grab.js";
+import { ABOVE, placeNear } from "./place_near.js";
 
 const EVERY = 40; // ms between two commands of a drag
 const READ = 250; // ms between two reads of the angle in the bar
 const STILL = 5; // px, below which a press is a click
-const ABOVE = 60; // px from the click to the bar, so that a finger does not cover it
-const EDGE = 8; // px between the bar and the edge of the scene
 const DEGREES = 180 / Math.PI;
 const ID = "joint-drag"; // id of the commands of a drag
 
@@ -194,7 +193,7 @@ export class Joints {
     if (joint === null) return;
     this.#angle.textContent = "";
     this.#show(joint);
-    this.#place(pixel);
+    placeNear(this.#bar, this.#scene, pixel);
     this.#read();
     this.#timer = setInterval(() => document.hidden || this.#read(), READ);
   }
@@ -234,18 +233,6 @@ export class Joints {
     if (joint === null) return;
     const by = (sign * this.#size()) / (this.#known.slides[joint] ? 1000 : DEGREES);
     this.#page.say({ do: "nudge", axis: joint + 1, by });
-  }
-
-  /** Put the bar above a pixel, inside the scene. It stays there, so that its buttons can be pressed again. @param {Page.Pixel} pixel */
-  #place([x, y]) {
-    const { offsetLeft, offsetTop } = this.#scene;
-    const { left, top, width } = this.#viewer.canvas.getBoundingClientRect();
-    /** @param {number} start @param {number} size @param {number} from @param {number} room */
-    const inside = (start, size, from, room) => Math.max(from + EDGE, Math.min(start, from + room - size - EDGE));
-    const { offsetWidth, offsetHeight } = this.#bar;
-    const above = y - ABOVE - offsetHeight;
-    this.#bar.style.left = `${offsetLeft + inside(x - offsetWidth / 2, offsetWidth, left, width)}px`;
-    this.#bar.style.top = `${offsetTop + (above < top + EDGE ? y + ABOVE : above)}px`;
   }
 
   /** Show words beside a pixel; null for none. @param {string | null} words @param {Page.Pixel | null} pixel */

@@ -21,8 +21,8 @@ export class Stage {
   #views;
   /** @type {Branches | null} */
   #branches = null; // only for an arm that has some
-  /** @type {import("../selection/selection.js").Selection | null} */
-  #selection = null; // the selected object, loaded with the first click beside the arm
+  /** @type {import("./selection.js").Selection | null} */
+  #selection = null; // the selected object, loaded with the first click on one
   /** @type {Page.Pixel | null} */
   #press = null; // [x, y] of a press that may become a click
   /** @type {{ pixel: Page.Pixel | null } | null} */
@@ -156,15 +156,26 @@ export class Stage {
   // Show that a click selects the object of which `shape` is a part; `joint` is under the pointer otherwise.
   /** @param {Three.Object3D | null} shape @param {number | null} joint */
   #point(shape, joint) {
-    const { node, drawing } = sceneIn(this.#scene);
-    const [objects, more] = [OBJECTS.map(node), node(MORE)];
-    let object = joint === null ? shape : null;
-    while (object && !objects.includes(object) && !(more && object.parent === more)) object = object.parent;
+    const object = joint === null ? this.#objectOf(shape) : null;
     if (object === this.#pointed) return;
     this.#pointed = object;
-    this.#glow.show(shapesOf(this.#pointed));
-    if (this.#pointed || joint === null) drawing().canvas.style.cursor = this.#pointed ? "pointer" : "";
-    drawing().requestRender();
+    this.#light();
+    if (object || joint === null) sceneIn(this.#scene).drawing().canvas.style.cursor = object ? "pointer" : "";
+  }
+
+  /** Return the node of the object of which `shape` is a part; null without one. @param {Three.Object3D | null} shape */
+  #objectOf(shape) {
+    const { node } = sceneIn(this.#scene);
+    const [objects, more] = [OBJECTS.map(node), node(MORE)];
+    let object = shape;
+    while (object && !objects.includes(object) && !(more && object.parent === more)) object = object.parent;
+    return object;
+  }
+
+  // Highlight the object under the pointer, or the selected one.
+  #light() {
+    this.#glow.show(shapesOf(this.#pointed ?? this.#selection?.node));
+    sceneIn(this.#scene).drawing().requestRender();
   }
 
   /** @param {PointerEvent} event */
@@ -182,12 +193,12 @@ export class Stage {
     const hit = this.#pick(pixel);
     const joint = hit && this.#joints.of(hit.object);
     this.#joints.select(joint, pixel);
-    if (joint !== null) return this.#selection?.clear();
-    if (!this.#selection) {
-      const { Selection } = await import("../selection/selection.js");
-      this.#selection ??= new Selection(this.#stage, this.#scene, this.#page);
+    const object = hit && joint === null ? this.#objectOf(hit.object) : null;
+    if (object && !this.#selection) {
+      const { Selection } = await import("./selection.js");
+      this.#selection ??= new Selection(this.#stage, this.#scene, this.#page, () => this.#light());
     }
-    this.#selection.pick(...pixel);
+    this.#selection?.pick(object, pixel);
   }
 
   /** Look at the point of a part or an object under the pointer. @param {MouseEvent} event */

@@ -39,7 +39,7 @@ def node_name(name: str) -> str:
     """Return the last part of the path of the node of a link or an object ``name``.
 
     A name may contain the separator of paths. The page finds the node by the same rule, which is
-    that of ``encodeURIComponent`` (``static/scene/joints.js``, ``static/selection/selection.js``).
+    that of ``encodeURIComponent`` (``static/scene/joints.js``, ``static/scene/selection.js``).
     """
     return quote(name, safe="!~*'()")
 
