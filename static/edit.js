@@ -68,10 +68,8 @@ function drag(event) {
   leaving = setTimeout(() => stage.classList.remove("dropping"), 300);
   if (event.type !== "drop") return;
   const files = [...event.dataTransfer.files];
-  // Folders are read after this event, which ends the access to what was dropped.
-  const entries = [...event.dataTransfer.items].flatMap((dropped) => dropped.webkitGetAsEntry?.() ?? []);
   if (files.length === 1 && /\.mcap$/i.test(files[0].name)) parts.replay(files[0]);
-  else if (files.length || entries.length) Objects.take(files, entries, tableAt(event));
+  else if (files.length) Objects.take(files, tableAt(event));
 }
 
 /** @param {Window} target */

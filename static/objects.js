@@ -5,20 +5,23 @@ import { chooseRobot } from "./more.js";
 
 const API = "api/v1/";
 const UNREACHABLE = "The server does not answer. Try again.";
+const ALONE = /\.(stl|ply|glb|3mf|zip)$/i; // what needs no other file
+const TOGETHER = "Files that belong together, such as a .gltf and its .bin, or a folder, are read from a .zip: put them into one.";
+const MAX_BYTES = 60e6; // of a file; the server accepts no more
+const TAIL = 200_000; // bytes at the end of a .zip file in which the names of its files are
 /** @param {string} id */
 const byId = (id) => element(id, HTMLElement);
 /** @type {Page.Say} */
 let say = () => {};
 const unit = element("unit", HTMLSelectElement);
 /** @type {File | null} */
-let file = null; // the last file that was chosen
+let file = null; // the last one that was chosen
 let main = ""; // the file to read in it, if it is a .zip file of several
 /** @type {string | null} */
 let placed = null; // the name of its object
 let fitted = false; // whether its scale was chosen to fit
 /** @type {[number, number] | null} */
 let where = null; // [x, y] of the point of the table on which the files were dropped
-const files = () => import("./objects/files.js");
 
 /** @param {string} words */
 function report(words, bad = false) {
@@ -119,10 +122,7 @@ export function begin(page) {
   byId("load").addEventListener("click", () => byId("scene-file").click());
   byId("save").addEventListener("click", saveScene);
   unit.addEventListener("change", () => add(true));
-  byId("add-folder").addEventListener("click", () => byId("object-folder").click());
-  byId("add-folder").hidden = !("webkitdirectory" in byId("object-folder")) || matchMedia("(pointer: coarse)").matches;
   onChoice("object-file", take);
-  onChoice("object-folder", take);
   onChoice("scene-file", ([first]) => load(first));
 }
 
@@ -138,35 +138,31 @@ export async function show(shown) {
   chosen.watch(!byId("objects").hidden);
 }
 
-// Read files that were chosen or dropped: one object or several, or a scene in a .zip file. `entries` are the dropped
-// files and folders, `at` is the point of the table on which they were dropped.
-/** @param {File[]} list @param {FileSystemEntry[]} [entries] @param {[number, number] | null} [at] */
-export async function take(list, entries, at = null) {
+// Read files that were chosen or dropped, each of which is an object, or a scene in a .zip file. `at` is the point of the
+// table on which they were dropped.
+/** @param {File[]} list @param {[number, number] | null} [at] */
+export async function take(list, at = null) {
   const robot = list.find(({ name }) => /\.(urdf|xacro)$/i.test(name));
   if (robot) return chooseRobot(robot);
   where = at;
   if (byId("objects").hidden) byId("objects-button").click();
-  const { gathered, areAlone, excess, zipped, isScene } = await files();
-  const parts = await gathered(list, entries).catch(() => []);
-  if (!parts.length) {
-    // One file of another kind is refused by the server, which lists the kinds it can read.
-    if (list.length === 1 && list[0].size) return read(list[0]);
-    return report("None of these files can be read as an object.", true);
+  const isFolder = list.length === 1 && !list[0].name.includes(".");
+  if (isFolder || (list.length > 1 && !list.every(({ name }) => ALONE.test(name)))) return report(TOGETHER, true);
+  for (const next of list) {
+    if (/\.zip$/i.test(next.name) && (await isScene(next))) await load(next);
+    else await read(next);
   }
-  const why = excess(parts);
-  if (why) return report(why, true);
-  if (parts.length > 1 && !areAlone(parts)) {
-    const [folder] = parts[0].path.split("/").slice(0, -1);
-    return read(await zipped(parts, `${folder ?? "files"}.zip`));
-  }
-  for (const part of parts) {
-    if (/\.zip$/i.test(part.path) && (await isScene(part.file))) await load(part.file);
-    else await read(part.file);
-  }
+}
+
+/** Return whether a .zip file holds a scene. @param {File} archive */
+async function isScene(archive) {
+  const tail = await archive.slice(-TAIL).arrayBuffer();
+  return new TextDecoder("latin1").decode(tail).includes("scene.yaml");
 }
 
 /** @param {File} first */
 function read(first) {
+  if (first.size > MAX_BYTES) return report(`${first.name} has ${Math.ceil(first.size / 1e6)} MB; at most ${MAX_BYTES / 1e6} are read.`, true);
   file = first;
   main = "";
   placed = null;

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import base64
+import io
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,6 @@ import pytest
 import trimesh
 
 from katana450.client import Client
-from katana450.extensions.export.vrml.vrml_world import HEADER
 from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
@@ -80,6 +81,15 @@ def cube(side: float, kind: str = "stl") -> bytes:
     return content.encode() if isinstance(content, str) else bytes(content)
 
 
+def zipped(files: dict[str, bytes]) -> bytes:
+    """Return an archive of ``files``."""
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as content:
+        for name, data in files.items():
+            content.writestr(name, data)
+    return archive.getvalue()
+
+
 def clear_refusals(page: ViserPage) -> None:
     """Drop what the browser reports about refused files; anything else is an error."""
     assert all("422" in error for error in page.errors)
@@ -102,15 +112,17 @@ def test_files_are_dropped_on_the_table_and_undone(page: ViserPage, reader: Clie
     np.testing.assert_allclose(place_of(reader, "left")[:2], place[:2], rtol=0, atol=0.002)
     page.wait_until(lambda: "triangles" in shown(page), "the answer")
     page.page.locator("#stage.dropping").wait_for(state="hidden")
-    # Files that belong together are one object.
+    # Files that belong together are one object, in a .zip.
     document = SQUARE | {"nodes": [{"mesh": 0, "scale": [0.1, 0.1, 0.1]}]}
-    drop(page, square_gltf=json.dumps(document).encode(), **{"a b_bin": DATA}, note_txt=b"x")
+    files = {"square.gltf": json.dumps(document).encode(), "a b.bin": DATA}
+    drop(page, square_gltf=files["square.gltf"], **{"a b_bin": DATA})
+    page.wait_until(lambda: "put them into one" in shown(page), "the refusal")
+    drop(page, square_zip=zipped(files))
     page.wait_until(lambda: "square" in objects(reader), "the object")
     assert "2 triangles, 100 × 0 × 100 mm" in shown(page)
-    part = f"{HEADER}\nShape {{ geometry Box {{ size 0.04 0.04 0.04 }} }}".encode()
-    drop(page, robot_wrl=f'{HEADER}\nInline {{ url "p/part.wrl" }}'.encode(), part_wrl=part)
-    page.wait_until(lambda: "robot" in objects(reader), "the other object")
-    assert "12 triangles" in shown(page)
+    # Others are objects of their own.
+    drop(page, one_stl=cube(20.0), two_ply=cube(20.0, "ply"))
+    page.wait_until(lambda: {"one", "two"} <= objects(reader).keys(), "both objects")
     undo(page, reader, before)
 
 
@@ -307,7 +319,8 @@ def test_undo_names_the_stops_that_its_page_knows(page: ViserPage, truth: Truth)
 
 @pytest.mark.long
 def test_one_of_several_files_is_chosen(page: ViserPage, reader: Client) -> None:
-    drop(page, left_obj=cube(20.0, "obj"), right_obj=cube(30.0, "obj"))
+    sides = {"left.obj": 20.0, "right.obj": 30.0}
+    drop(page, both_zip=zipped({name: cube(side, "obj") for name, side in sides.items()}))
     choice = page.page.locator("#which button", has_text="right.obj")
     choice.wait_for()
     assert "choose one of left.obj, right.obj" in shown(page)
