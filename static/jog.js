@@ -184,7 +184,6 @@ function rates() {
   // Its button for STOP counts also with the sheet closed.
   const pad = gamepad();
   if (!open) return none();
-  steps?.deflect(steps.on ? pad : none());
   if (steps?.on) return none();
   const sum = none();
   /** @param {number[]} other */

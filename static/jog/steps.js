@@ -5,7 +5,6 @@ import { readArm } from "../server.js";
 
 const SIZES = [0, 0.1, 1, 10]; // mm or degrees; 0 to hold
 const RADIANS = Math.PI / 180;
-const EDGE = 0.5; // fraction of a stick's travel that counts as a press
 // Name and unit of each step of the tool; only an arm with six freedoms has the yaw, and one with an arm angle the elbow.
 const AXES = [["x", "mm"], ["y", "mm"], ["z", "mm"], ["Pitch", "°"], ["Roll", "°"], ["Yaw", "°"], ["Elbow", "°"]];
 const ELBOW = 6; // its place in AXES
@@ -19,7 +18,6 @@ export class Steps {
   /** @type {"base" | "tool" | "joints"} */
   #frame = "base";
   #arm; // the description of the arm
-  #held = [0, 0, 0, 0, 0, 0, 0]; // signs of the gamepad's sticks
   #gripped = [false, false];
   #grid = html("div", { id: "steps", hidden: "" });
   #gripper = html("fieldset", { id: "gripper" }, html("legend", {}, "Gripper"));
@@ -100,13 +98,6 @@ export class Steps {
       if (pressed && this.#frame !== "joints") this.step(...moves[event.code]);
     } else return false;
     return true;
-  }
-
-  /** Take the sticks of a gamepad: one step each time that one leaves its middle. @param {number[]} rates */
-  deflect(rates) {
-    const signs = rates.map((rate) => (Math.abs(rate) > EDGE ? Math.sign(rate) : 0));
-    signs.forEach((sign, axis) => sign && sign !== this.#held[axis] && this.#frame !== "joints" && this.step(axis, sign));
-    this.#held = signs;
   }
 
   /** Take the gamepad's buttons for the gripper; a button that stays pressed counts once. @param {boolean} open @param {boolean} closed */
