@@ -6,9 +6,10 @@ import { Knob } from "./knob.js";
 import { Plot } from "./plot.js";
 import { signed } from "./shape.js";
 
+/** @typedef {"small" | "wide" | "broad"} Size */
 /**
  * @typedef {object} Instrument
- * @property {string} id @property {string} title @property {string[]} sizes @property {boolean} shown
+ * @property {string} id @property {string} title @property {Size} size @property {boolean} shown
  * @property {HTMLElement} element
  * @property {(state: Api.State, loop: Api.Loop | null) => void} draw
  * @property {Knob} [knob] @property {Plot} [plot]
@@ -16,11 +17,8 @@ import { signed } from "./shape.js";
 /** @typedef {import("./channels.js").Fingers} Fingers */
 /** @typedef {{ history: import("./history.js").History, groups: Record<string, number[]>, view: import("./plot.js").Span }} Plotted */
 const MS = 1000;
-const ONE = ["small", "large"];
-const ROW = ["wide", "large", "broad"];
-const BIG = ["broad", "large", "wide"];
 
-// Return [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}].
+// Return [{id, title, size, shown, element, draw(state, loop), knob?, plot?}].
 /** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Plotted & { say: Page.Say, touch: Api.State["touch"] }} page @returns {Instrument[]} */
 export function instruments(arm, gripper, { say, history, groups, view, touch }) {
   return [...knobs(arm, gripper, say), ...gauges(arm), ...(touch ? [grip(touch)] : []), ...plots(arm, gripper, history, groups, view)];
@@ -38,7 +36,7 @@ function knobs(arm, gripper, say) {
     const knob = new Knob({ title, ...options, command: new Command(id, request, say) });
     /** @param {Api.State} state */
     const draw = (state) => knob.take(state, ...of(state));
-    return { id, title, sizes: ONE, shown: true, element: knob.element, draw, knob };
+    return { id, title, size: "small", shown: true, element: knob.element, draw, knob };
   };
   const read = readings(arm);
   /** @param {number} value */
@@ -84,7 +82,7 @@ function gauge(id, title, options, of) {
   const made = new Gauge({ title, ...options });
   /** @type {Instrument["draw"]} */
   const draw = (state, loop) => made.show(...of(state, loop));
-  return { id, title, sizes: ONE, shown: true, element: made.element, draw };
+  return { id, title, size: "small", shown: true, element: made.element, draw };
 }
 
 /** @param {number} value */
@@ -98,7 +96,7 @@ function gauges(arm) {
   const bars = new Bars({ title: "Joint speeds", rows, text: one, unit: units.join(", ") });
   /** @type {Instrument} */
   const rates = {
-    id: "rates", title: "Joint speeds", sizes: ROW, shown: true, element: bars.element,
+    id: "rates", title: "Joint speeds", size: "wide", shown: true, element: bars.element,
     draw: ({ qd }) => bars.show(qd.map((rate, i) => rate * read[i].of)),
   };
   const late = gauge(
@@ -183,8 +181,8 @@ function plots(arm, gripper, history, groups, view) {
    * @param {boolean} shown @returns {Instrument}
    */
   const plot = (id, title, group, least, decimals, shown) => {
-    const made = new Plot({ id, title, history, channels: groups[group], view, least, decimals });
-    return { id, title, sizes: BIG, shown, element: made.element, draw: () => made.draw(), plot: made };
+    const made = new Plot({ title, history, channels: groups[group], view, least, decimals });
+    return { id, title, size: "broad", shown, element: made.element, draw: () => made.draw(), plot: made };
   };
   const unit = [...new Set(readings(arm).map(({ mark }) => mark.trim()))].join(", ");
   const joints = [

@@ -2,15 +2,15 @@
 export const DEGREES = 180 / Math.PI;
 export const MM = 1000;
 
-/** @typedef {{ label: string, short?: string, unit: string, of: (state: Api.State) => number | null | undefined }} Channel */
+/** @typedef {{ label: string, short?: string, of: (state: Api.State) => number | null | undefined }} Channel */
 /** @typedef {{ percent: (angle: number) => number, angle: (percent: number) => number }} Fingers */
 
 /** Return the name for people of a link or an object. @param {string} part */
 export const spoken = (part) => part.replace(/_link$/, "").replaceAll("_", " ");
 
-/** Return {of, unit, mark} for each joint: factor to display units, unit, and its mark after numbers. @param {Api.Arm} arm */
+/** Return {of, mark} for each joint: factor to display units, and their mark after numbers. @param {Api.Arm} arm */
 export function readings(arm) {
-  return arm.slides.map((slides) => (slides ? { of: MM, unit: "mm", mark: " mm" } : { of: DEGREES, unit: "deg", mark: "°" }));
+  return arm.slides.map((slides) => (slides ? { of: MM, mark: " mm" } : { of: DEGREES, mark: "°" }));
 }
 
 // Return {channels, groups}; a group is a list of channel indices. gripper: {percent(angle)} or null.
@@ -25,24 +25,23 @@ export function channelsOf(arm, gripper, fingers) {
     groups[name] = more.map((channel) => channels.push(channel) - 1);
   };
   const read = readings(arm);
-  /** @param {(unit: string) => string} unit @param {(i: number) => Channel["of"]} of */
-  const axes = (unit, of) =>
-    arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, short: `${i + 1}`, unit: unit(read[i].unit), of: of(i) }));
-  group("angles", ...axes((unit) => unit, (i) => ({ q }) => q[i] * read[i].of));
-  group("speeds", ...axes((unit) => `${unit}/s`, (i) => ({ qd }) => qd[i] * read[i].of));
-  group("errors", ...axes((unit) => unit, (i) => ({ q, setpoint }) => (setpoint[i] - q[i]) * read[i].of));
+  /** @param {(i: number) => Channel["of"]} of */
+  const axes = (of) => arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, short: `${i + 1}`, of: of(i) }));
+  group("angles", ...axes((i) => ({ q }) => q[i] * read[i].of));
+  group("speeds", ...axes((i) => ({ qd }) => qd[i] * read[i].of));
+  group("errors", ...axes((i) => ({ q, setpoint }) => (setpoint[i] - q[i]) * read[i].of));
   if (arm.joints_only) return { channels, groups };
-  group("loads", ...axes(() => "N m", (i) => ({ holding }) => holding?.[i]));
-  group("tool", ...["x", "y", "z"].map((label, i) => /** @type {Channel} */ ({ label, unit: "mm", of: ({ T }) => T && T[i][3] * MM })));
-  group("clearance", { label: "Nearest", unit: "mm", of: ({ margins }) => (margins?.clearance ?? NaN) * MM });
-  group("speed", { label: "Tool", unit: "mm/s", of: ({ tool_speed: speed }) => (speed ?? NaN) * MM });
+  group("loads", ...axes((i) => ({ holding }) => holding?.[i]));
+  group("tool", ...["x", "y", "z"].map((label, i) => /** @type {Channel} */ ({ label, of: ({ T }) => T && T[i][3] * MM })));
+  group("clearance", { label: "Nearest", of: ({ margins }) => (margins?.clearance ?? NaN) * MM });
+  group("speed", { label: "Tool", of: ({ tool_speed: speed }) => (speed ?? NaN) * MM });
   if (gripper) {
     group(
       "gripper",
-      { label: "Now", unit: "%", of: ({ gripper: angle }) => gripper.percent(angle) },
-      { label: "Goal", unit: "%", of: ({ gripper_goal: angle }) => gripper.percent(angle) },
+      { label: "Now", of: ({ gripper: angle }) => gripper.percent(angle) },
+      { label: "Goal", of: ({ gripper_goal: angle }) => gripper.percent(angle) },
     );
   }
-  group("forces", ...fingers.map((name, i) => /** @type {Channel} */ ({ label: spoken(name), unit: "N", of: ({ touch }) => touch?.fingers[i].force })));
+  group("forces", ...fingers.map((name, i) => /** @type {Channel} */ ({ label: spoken(name), of: ({ touch }) => touch?.fingers[i].force })));
   return { channels, groups };
 }

@@ -9,7 +9,7 @@ export class History {
   #columns;
   #count = 0; // number of all samples; the last CAPACITY of them are stored
 
-  /** channels: [{label, unit, of(state)}]; a missing number is NaN. @param {import("./channels.js").Channel[]} channels */
+  /** channels: [{label, of(state)}]; a missing number is NaN. @param {import("./channels.js").Channel[]} channels */
   constructor(channels) {
     this.channels = channels;
     this.#columns = channels.map(() => new Float64Array(CAPACITY));
@@ -64,17 +64,5 @@ export class History {
     const n = this.at(t);
     if (n > this.first && (n === this.end || t - this.time(n - 1) < this.time(n) - t)) return n - 1;
     return n < this.end ? n : -1;
-  }
-
-  /** @param {number[]} channels @param {number} from @param {number} to */
-  csv(channels, from, to) {
-    /** @param {number} i */
-    const name = (i) => `"${this.channels[i].label} [${this.channels[i].unit}]"`;
-    const lines = [['"t [s]"', ...channels.map(name)].join(",")];
-    for (let n = this.at(from); n < this.end && this.time(n) <= to; n += 1) {
-      const values = channels.map((i) => this.value(i, n));
-      lines.push([this.time(n), ...values.map((value) => (Number.isNaN(value) ? "" : value))].join(","));
-    }
-    return `${lines.join("\r\n")}\r\n`;
   }
 }

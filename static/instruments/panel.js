@@ -11,7 +11,7 @@ const LOOK_EVERY = 1000; // ms; the control loop reports its lateness at this in
 const SPANS = { 10: "10 s", 30: "30 s", 120: "2 min" };
 const OLD = 1.0; // s, age from which values are marked as old
 
-/** @typedef {{ say: Page.Say, watch: (hz: number) => void, kept: Storage | null, quietly: string }} Connection */
+/** @typedef {{ say: Page.Say, watch: (hz: number) => void, kept: Page.Kept, quietly: string }} Connection */
 
 export class Panel {
   #root;
@@ -116,12 +116,14 @@ export class Panel {
     const pause = toggle("Pause", "Stop the plots; new values are still stored", (on) =>
       this.#look({ end: on ? (this.#history?.newest ?? null) : null }),
     );
-    const arrange = toggle("Arrange", "Move, resize, show and hide instruments", (on) => this.#board?.arrange(on));
+    const choose = toggle("Choose", "Show and hide instruments", (on) => {
+      if (this.#board) this.#board.list.hidden = !on;
+    });
     return html(
       "div",
       { class: "toolbar", role: "group", "aria-label": "Plots and cards" },
       html("fieldset", { class: "choice", "aria-label": "Time that plots show" }, ...spans),
-      pause, this.#age, arrange,
+      pause, this.#age, choose,
     );
   }
 

@@ -1,5 +1,5 @@
-// A plot of some channels over the last seconds, with a cursor for reading and export as CSV.
-import { save, write } from "../dom.js";
+// A plot of some channels over the last seconds, with a cursor for reading.
+import { write } from "../dom.js";
 import { GAP } from "./history.js";
 import { digits, scale } from "./scale.js";
 import { clamp, html, set, signed } from "./shape.js";
@@ -22,7 +22,6 @@ const READ_KEYS = { ArrowLeft: -READ_BY, ArrowRight: READ_BY };
 
 export class Plot {
   #history;
-  #channels;
   #view;
   #least;
   #digits;
@@ -40,23 +39,16 @@ export class Plot {
   // least: minimum range of the vertical axis. decimals: decimals of the read-out.
   /**
    * @param {object} options
-   * @param {string} options.id @param {string} options.title @param {import("./history.js").History} options.history
+   * @param {string} options.title @param {import("./history.js").History} options.history
    * @param {number[]} options.channels @param {Span} options.view @param {number} options.least @param {number} options.decimals
    */
-  constructor({ id, title, history, channels, view, least, decimals }) {
+  constructor({ title, history, channels, view, least, decimals }) {
     this.#history = history;
-    this.#channels = channels;
     this.#view = view;
     this.#least = least;
     this.#digits = decimals;
     set(this.#canvas, "aria-label", `${title} over time; arrow keys move a cursor along it`);
     this.#legend = channels.map((channel, i) => this.#entry(channel, i));
-    this.action = html(
-      "button",
-      { type: "button", class: "csv", title: "Save what is shown", "aria-label": `${title} as CSV` },
-      "CSV",
-    );
-    this.action.addEventListener("click", () => this.#save(id));
     this.element = html(
       "div",
       { class: "plot" },
@@ -285,11 +277,5 @@ export class Plot {
     pen.fillStyle = text;
     pen.textAlign = "left";
     pen.fillText(words, left + 5, box.bottom + 14);
-  }
-
-  /** @param {string} id */
-  #save(id) {
-    const text = this.#history.csv(this.#channels, ...this.#ends());
-    save(new Blob([text], { type: "text/csv" }), `katana450-${id}.csv`);
   }
 }

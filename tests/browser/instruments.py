@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from tests.browser.page import ViserPage
@@ -75,11 +71,7 @@ def turn(page: ViserPage, name: str, degrees: float) -> None:
     mouse.up()
 
 
-def table(page: ViserPage, name: str) -> dict[str, Any]:
-    """Return the columns of a plot's CSV file by heading."""
-    with page.page.expect_download() as download:
-        card(page, name).get_by_role("button", name="as CSV").click()
-    file = download.value
-    assert file.suggested_filename == f"katana450-{name}.csv"
-    heading, *rows = csv.reader(io.StringIO(Path(file.path()).read_text(encoding="utf-8")))
-    return dict(zip(heading, np.array(rows, float).T, strict=True))
+def legend(page: ViserPage, name: str) -> list[float]:
+    """Return the values that the legend of a plot shows."""
+    texts = card(page, name).locator(".legend output").all_inner_texts()
+    return [float(text.replace("−", "-").replace("–", "nan")) for text in texts]
