@@ -1,5 +1,5 @@
 // The selected part of a recording: its ends, and what can be done with it.
-import { keep } from "../more/keep.js";
+import { save, timestamp } from "../dom.js";
 import { messageOf, queryOf, request } from "../server.js";
 import { ScriptRun } from "../teach/run.js";
 import { lengthOf, placeOf } from "./axis.js";
@@ -13,6 +13,7 @@ export class Selection {
   #page;
   #work; // exports and verifications
   #run; // of a recorded motion
+  #saving = false;
   /** @type {[start: number | null, end: number | null]} */
   #ends = [null, null]; // [s since the epoch]; null: that of the recording
 
@@ -63,8 +64,21 @@ export class Selection {
   }
 
   /** @param {Part | null} part */
-  save(part) {
-    if (part) keep(this.#page.toast, part);
+  async save(part) {
+    const { toast } = this.#page;
+    if (!part || this.#saving) return;
+    this.#saving = true;
+    toast("The recording is being made.");
+    try {
+      const answer = await request(`api/v1/recording?${queryOf(part)}`);
+      const name = `katana450-${timestamp()}.mcap`;
+      save(await answer.blob(), name);
+      toast(`The recording is saved as ${name}.`);
+    } catch (error) {
+      toast(`Nothing was saved: ${messageOf(error)}`);
+    } finally {
+      this.#saving = false;
+    }
   }
 
   // Export the part as the format `what`, or verify it. `words` says what is done.

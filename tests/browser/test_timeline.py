@@ -15,15 +15,14 @@ from katana450.client import connect
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.playback.run import PlaybackRun, at_place
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.api import answers, requests
-from tests.browser.camera import Drawing
+from katana450.server.api import requests
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import Truth, prepare
 from tests.browser.sight import overlap
 from tests.browser.sizes import PHONE, SIZES, WIDE, in_sizes_and_schemes
-from tests.browser.test_accessibility import AXE, findings
+from tests.browser.test_accessibility import findings
 
 GHOST = "/playback/0/arm"
 LINK = "/arm/base_link/arm_base_link/pan_link"
@@ -83,19 +82,6 @@ def newest_turn(run: PlaybackRun) -> float:
     run.update()
     moment = run.at(math.inf) if run.spans else None
     return 0.0 if moment is None else moment.row.joints[0]
-
-
-@pytest.mark.long
-def test_menu_saves_the_last_minutes(
-    server: AppServer, open_page: OpenPage, tmp_path: Path
-) -> None:
-    page = open_page(server.url, drawing=Drawing.NONE)
-    page.page.click("#more-button")
-    with page.page.expect_download() as downloading:
-        page.press_in_bar("Save the last 10 minutes")
-    assert downloading.value.suggested_filename.endswith(".mcap")
-    downloading.value.save_as(tmp_path / "run.mcap")
-    assert katana450.open(tmp_path / "run.mcap").verify().identical
 
 
 def opened(page: ViserPage) -> None:
@@ -346,40 +332,13 @@ def test_timeline_covers_nothing(
     assert min(small) >= (32.0 if size == "wide" else 44.0) - 0.5
     cut = page.page.locator("#timeline select").evaluate_all(CUT)
     assert cut == []
-    if AXE.exists():
-        assert findings(page.page) == []
+    assert findings(page.page) == []
     assert page.errors == []
 
 
 def slider_place(page: ViserPage) -> float:
     """Return the place [s] of the moment that ``page`` shows."""
     return float(page.page.get_by_label(NOW).input_value())
-
-
-@pytest.mark.long
-def test_selected_motion_runs_again_as_a_program(
-    server: AppServer, folder: Path, open_page: OpenPage
-) -> None:
-    page = open_page(server.url, nodes=("/arm",))
-    opened(page)
-    with connect(server.url, "Ada") as arm:
-        moved, began = np.array(arm.query(answers.State).q), time.time()
-        page.page.get_by_role("button", name="Run again the selected motion").click()
-        page.page.get_by_text("The motion has run again.").wait_for(timeout=90_000)
-        state = arm.query(answers.State)
-    assert state.program is not None
-    assert state.program.status == "done"
-    np.testing.assert_allclose(state.q, moved, atol=1e-4)
-    run = PlaybackRun(lambda: recordings_in(folder))
-
-    def largest_turn() -> float:
-        """Return the largest angle of axis 1 [rad] that was recorded since the click."""
-        run.update()
-        times = np.linspace(began, max(began, run.spans[-1].end), 200).tolist()
-        return max(moment.row.joints[0] for t in times if (moment := run.at(t)) is not None)
-
-    # It went back to the start, and through both turns.
-    page.wait_until(lambda: largest_turn() > TURNS[0] - 0.01, "the recorded turn")
 
 
 @pytest.mark.long
