@@ -1,4 +1,4 @@
-// The small menu: the person's name, a picture, a recording, the address for a phone, and another robot.
+// The small menu: the person's name, a picture, the address for a phone, and another robot.
 import { element, first, onClick, save, timestamp } from "./dom.js";
 import { picture } from "./viser/pictures.js";
 
@@ -9,14 +9,12 @@ const theme = first("#theme select", HTMLSelectElement);
 const field = element("own-name", HTMLInputElement);
 const why = element("own-name-why", HTMLElement);
 const ID = "name"; // id of the request for a name
-const RECORDED = 600; // s of motion that the server keeps
 /** @type {Page.Context} */
 let page;
 let wanted = ""; // name that was sent and not answered yet
 let known = ""; // name that the server shows
 /** @type {Page.Robot | null} */
 let robot = null; // the robot that the server drives
-let chosen = ""; // name that the server has taken, if the browser stores none
 
 /** @param {string} words */
 const refuse = (words) => {
@@ -63,10 +61,6 @@ export function begin(context) {
   });
   theme.addEventListener("change", async () => (await import("./theme.js")).choose(theme.value));
   onClick("snapshot", snapshot);
-  onClick("keep-recording", async () => {
-    const { keep } = await import("./more/keep.js");
-    keep(toast, { last: RECORDED });
-  });
   onClick("robots-button", () => chooseRobot());
   // In the bar, or in the menu for a finger.
   for (const id of ["phone-bar", "phone-button"])
@@ -96,7 +90,7 @@ function note(status) {
   const { name } = status;
   if (name === known) return;
   known = name;
-  const own = page.kept?.getItem(NAME) ?? chosen;
+  const own = page.kept.getItem(NAME);
   // A server that was restarted has forgotten it.
   if (own && own !== name && /^Window \d+$/.test(name)) ask(own);
 }
@@ -112,8 +106,7 @@ export function hear(answer) {
     refuse(answer.why);
     if (!dialog.open) page.toast(answer.why);
   } else {
-    chosen = wanted.trim();
-    page.kept?.setItem(NAME, chosen);
+    page.kept.setItem(NAME, wanted.trim());
     refuse("");
     dialog.close();
   }

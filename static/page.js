@@ -13,6 +13,7 @@ import { pageName } from "./page/page_name.js";
 import { Parts, QUIETLY } from "./page/parts.js";
 import { Sheets } from "./page/sheets.js";
 import { StopPress } from "./page/stop.js";
+import { storage } from "./page/storage.js";
 import { Store } from "./page/store.js";
 import { named, showToast } from "./page/words.js";
 import { PARAMETER } from "./viser/names.js";
@@ -36,7 +37,7 @@ const page = {
     parts.timeline?.said(request);
   },
   toast: (words) => showToast(withNames(words)),
-  kept: storage(),
+  kept: storage(() => localStorage),
   scene: element("scene", HTMLIFrameElement),
   stage: element("stage", HTMLElement),
   name: pageName(),
@@ -52,15 +53,6 @@ const bar = new Bar(page, stopPress, withNames);
 const parts = new Parts(page, frame, (hz) => send({ watch: hz }));
 const sheets = new Sheets(page, parts);
 const key = keyHandler(page, parts, stop);
-
-// A browser may refuse to store anything.
-function storage() {
-  try {
-    return window.localStorage;
-  } catch {
-    return null;
-  }
-}
 
 function stop() {
   stopPress.send();
@@ -147,8 +139,7 @@ function lose() {
 
 /** @param {Page.Answer} answer */
 function take(answer) {
-  if (answer.is === "state") parts.rumble?.take(answer);
-  else if (answer.is === "stopped") stopPress.answered();
+  if (answer.is === "stopped") stopPress.answered();
   else if (answer.is === "people") parts.people?.heard(answer);
   else if (answer.is === "status") store.take(answer);
   else if ([More, parts.welcome, parts.teach, parts.timeline].some((part) => part?.hear(answer))) return;

@@ -1,33 +1,17 @@
 // The light or dark theme, for both documents of a tab, set before either draws. It is the one chosen
 // in this tab, otherwise that of the system.
+import { storage } from "./page/storage.js";
+
 const KEY = "katana450.theme";
 const system = matchMedia("(prefers-color-scheme: dark)");
 /** @typedef {"Dark" | "Light"} Name */
 /** @type {(name: Name) => void} */
 let listener = () => {};
 
-/** @type {string | null} */
-let chosen = null; // if the browser refuses to store it
-const stored = () => {
-  try {
-    return sessionStorage.getItem(KEY) ?? chosen;
-  } catch {
-    return chosen;
-  }
-};
-/** @param {string} theme */
-const store = (theme) => {
-  chosen = theme;
-  try {
-    sessionStorage.setItem(KEY, theme);
-  } catch {
-    // It lasts as long as this document.
-  }
-};
-
-if (new URLSearchParams(location.search).has("darkMode") && !stored()) store("Dark");
+const kept = storage(() => sessionStorage);
+if (new URLSearchParams(location.search).has("darkMode") && !kept.getItem(KEY)) kept.setItem(KEY, "Dark");
 /** @returns {Name} */
-export const name = () => ((stored() ?? (system.matches ? "Dark" : "Light")) === "Dark" ? "Dark" : "Light");
+export const name = () => ((kept.getItem(KEY) ?? (system.matches ? "Dark" : "Light")) === "Dark" ? "Dark" : "Light");
 
 function apply() {
   const html = document.documentElement;
@@ -43,7 +27,7 @@ apply();
 
 /** @param {string} theme */
 export function choose(theme) {
-  store(theme);
+  kept.setItem(KEY, theme);
   apply();
 }
 

@@ -4,12 +4,7 @@ import { element, onClick } from "../dom.js";
 const OPEN = "katana450.instruments.open";
 const WELCOMED = "katana450.welcome";
 const PAST = "katana450.timeline.open";
-const RUMBLE = "katana450.rumble";
-const RUMBLE_RATE = 20; // Hz
 export const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
-
-/** @param {string} id @param {string} name @param {boolean} on */
-const mark = (id, name, on) => element(id, HTMLButtonElement).setAttribute(name, String(on));
 
 export class Parts {
   #page;
@@ -25,8 +20,6 @@ export class Parts {
   timeline = null;
   /** @type {import("../people/people.js").People | null} */
   people = null;
-  /** @type {import("../touch/rumble.js").Rumble | null} */
-  rumble = null;
   /** @type {import("../instruments/panel.js").Panel | null} */
   panel = null;
   /** @type {import("../welcome/welcome.js").Welcome | null} */
@@ -37,8 +30,6 @@ export class Parts {
   #teachLoads = null; // one sheet, also after two clicks
   /** @type {Promise<import("../welcome/welcome.js").Welcome> | null} */
   #welcomeLoads = null; // one card, also after two requests
-  /** @type {Record<string, number>} */
-  #rates = {}; // at which parts of the page want states [Hz]
 
   /** `watch` asks for states at a rate [Hz]. @param {Page.Context} page @param {import("./first_frame.js").FirstFrame} frame @param {(hz: number) => void} watch */
   constructor(page, frame, watch) {
@@ -56,26 +47,24 @@ export class Parts {
       help.close();
       this.#showPeople();
     });
-    onClick("rumble-button", () => this.#vibrate(!this.rumble));
     onClick("welcome-button", () => {
       help.close();
       this.#showWelcome();
     });
     const instruments = element("instruments-button", HTMLButtonElement);
     onClick("instruments-button", () => this.#showInstruments(instruments.ariaExpanded !== "true"));
-    if (page.kept?.getItem(RUMBLE) === "yes") this.#vibrate(true);
   }
 
   // Show what was open when the person was here last, now that they have signed in.
   begin() {
     const { kept, store } = this.#page;
-    if (kept?.getItem(OPEN) === "yes") this.#showInstruments(true);
+    if (kept.getItem(OPEN) === "yes") this.#showInstruments(true);
     let isFirst = true;
     store.follow(async ({ role }) => {
       if (!isFirst) return;
       isFirst = false;
       await this.#frame.rest;
-      if (this.#frame.canDraw && role !== "viewer" && !kept?.getItem(WELCOMED)) this.#showWelcome();
+      if (this.#frame.canDraw && role !== "viewer" && !kept.getItem(WELCOMED)) this.#showWelcome();
     });
   }
 
@@ -96,7 +85,7 @@ export class Parts {
     if (!this.episodes && !status.episodes) return;
     await this.#frame.rest;
     const { Episodes } = await import("../episodes/episodes.js");
-    if (!this.episodes && this.#page.kept?.getItem(PAST) !== "no") this.showTimeline(true, false);
+    if (!this.episodes && this.#page.kept.getItem(PAST) !== "no") this.showTimeline(true, false);
     this.episodes ??= new Episodes(this.#page);
     this.episodes.draw(this.#page.store.status ?? status);
   }
@@ -111,7 +100,7 @@ export class Parts {
 
   /** Show the line of what was recorded, `open` with its controls, or fold it away. @param {boolean} shown @param {boolean} open */
   async showTimeline(shown, open) {
-    this.#page.kept?.setItem(PAST, shown ? "yes" : "no");
+    this.#page.kept.setItem(PAST, shown ? "yes" : "no");
     const { Timeline } = await import("../timeline/timeline.js");
     this.timeline ??= new Timeline(element("timeline", HTMLElement), this.#page, () => this.showTimeline(false, false));
     await this.timeline.show(shown, open);
@@ -130,20 +119,6 @@ export class Parts {
     this.people.show();
   }
 
-  /** Ask for states as often as the part that wants most. @param {string} part @param {number} hz */
-  #see(part, hz) {
-    this.#rates[part] = hz;
-    this.#watch(Math.max(...Object.values(this.#rates)));
-  }
-
-  /** The vibration of gamepad and phone. @param {boolean} on */
-  async #vibrate(on) {
-    mark("rumble-button", "aria-pressed", on);
-    this.#page.kept?.setItem(RUMBLE, on ? "yes" : "no");
-    this.rumble = on ? new (await import("../touch/rumble.js")).Rumble() : null;
-    this.#see("rumble", on ? RUMBLE_RATE : 0);
-  }
-
   // The first steps: at each visit until they are dismissed, and from the help.
   async #showWelcome() {
     this.#welcomeLoads ??= import("../welcome/welcome.js").then(({ Welcome }) => Welcome.on(this.#page));
@@ -157,10 +132,10 @@ export class Parts {
     const { say, kept } = this.#page;
     const button = element("instruments-button", HTMLButtonElement);
     button.ariaExpanded = String(shown);
-    kept?.setItem(OPEN, shown ? "yes" : "no");
+    kept.setItem(OPEN, shown ? "yes" : "no");
     if (shown && !this.panel) {
       const { Panel } = await import("../instruments/panel.js");
-      this.panel ??= new Panel(element("instruments", HTMLElement), { say, watch: (hz) => this.#see("panel", hz), kept, quietly: QUIETLY });
+      this.panel ??= new Panel(element("instruments", HTMLElement), { say, watch: this.#watch, kept, quietly: QUIETLY });
     }
     this.panel?.show(button.ariaExpanded === "true");
   }

@@ -18,8 +18,8 @@ export class Content {
   now = { name: "My script", times: 1, poses: [], text: null };
   broken = false; // whether something else was kept
 
-  // storage: of the browser, or null; arm: the answer `arm`. `listener` is called after each change.
-  /** @param {Storage | null} storage @param {Api.Arm} arm @param {() => void} listener */
+  // storage: of the browser; arm: the answer `arm`. `listener` is called after each change.
+  /** @param {Page.Kept} storage @param {Api.Arm} arm @param {() => void} listener */
   constructor(storage, arm, listener) {
     this.#storage = storage;
     this.#key = `${KEY} ${arm.name}`;
@@ -27,7 +27,7 @@ export class Content {
     const joints = arm.joints.length;
     try {
       // Earlier versions kept one list, of poses with five joints.
-      const json = storage?.getItem(this.#key) ?? (joints === 5 ? storage?.getItem(KEY) : null);
+      const json = storage.getItem(this.#key) ?? (joints === 5 ? storage.getItem(KEY) : null);
       if (json) this.now = restored(json, joints);
     } catch {
       this.broken = true;
@@ -81,11 +81,7 @@ export class Content {
   /** @param {Kept} now */
   #become(now) {
     this.now = now;
-    try {
-      this.#storage?.setItem(this.#key, kept(now));
-    } catch {
-      // The browser keeps nothing; the sheet works as long as the page is open.
-    }
+    this.#storage.setItem(this.#key, kept(now));
     this.#listener();
   }
 }

@@ -54,7 +54,7 @@ export class Welcome {
     element("toast", HTMLElement).before(this.#card, this.#pulse);
     page.store.follow((news) => this.#note(news));
     window.addEventListener("placed", () => this.#done("part"));
-    for (const name of (page.kept?.getItem(DONE) ?? "").split(",")) if (name in this.#steps) this.#done(name);
+    for (const name of (page.kept.getItem(DONE) ?? "").split(",")) if (name in this.#steps) this.#done(name);
     if (status) this.#note(status);
   }
 
@@ -62,17 +62,8 @@ export class Welcome {
     this.#card.hidden = false;
   }
 
-  /** A browser may refuse to store anything; then the card returns as new with the next visit. @param {string} key @param {string} entry */
-  #keep(key, entry) {
-    try {
-      this.#page.kept?.setItem(key, entry);
-    } catch {
-      // Nothing to do.
-    }
-  }
-
   #dismiss() {
-    this.#keep(KEPT, "done");
+    this.#page.kept.setItem(KEPT, "done");
     this.#still();
     this.#card.hidden = true;
     element("help-button", HTMLElement).focus();
@@ -88,8 +79,8 @@ export class Welcome {
 
   /** @param {string} name */
   #done(name) {
-    const done = (this.#page.kept?.getItem(DONE) ?? "").split(",").filter(Boolean);
-    if (!done.includes(name)) this.#keep(DONE, [...done, name].join());
+    const done = (this.#page.kept.getItem(DONE) ?? "").split(",").filter(Boolean);
+    if (!done.includes(name)) this.#page.kept.setItem(DONE, [...done, name].join());
     this.#steps[name].button.classList.add("done");
     write(this.#steps[name].mark, "✓ done: ");
   }

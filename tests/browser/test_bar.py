@@ -220,10 +220,9 @@ def test_the_page_is_small() -> None:
     # The modules in these scripts are also there alone, for people.
     together = re.compile(r"[^/]*|(page|viser)/.*")
     sent = {name: size for name, size in sent.items() if not together.fullmatch(name)}
-    # The timeline and programs are only for those who open them, files of objects for those who add
-    # one, episodes for servers that record, touch for those who open the instruments or let a
-    # device vibrate, and the arm for those who have one.
-    folders = dict.fromkeys(("timeline", "teach", "objects", "episodes", "touch", "arm"), 0)
+    # The timeline and programs are only for those who open them, the form of an object for those
+    # who open Objects, episodes for servers that record, and the arm for those who have one.
+    folders = dict.fromkeys(("timeline", "teach", "objects", "episodes", "arm"), 0)
     for name, size in sent.items():
         folder = name.partition("/")[0]
         if folder in folders:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,8 +11,6 @@ from playwright.sync_api import Browser, Page
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import TaughtPose, taught
 from katana450.extensions.recording.playback.run import Span, at_place, place_of
-from katana450.maths.collision.clearance import MIN_CLEARANCE
-from katana450.resources import STATIC
 from tests.browser.bare_page import bare_page, load, module
 
 
@@ -269,7 +266,7 @@ ARM = {
 }
 
 
-def test_steps_move_once_by_button_key_and_stick(browser: Browser) -> None:
+def test_steps_move_once_by_button_and_key(browser: Browser) -> None:
     with bare_page(browser, arm=ARM) as page:
         page.evaluate(DEVICES)
         page.evaluate(
@@ -288,6 +285,11 @@ def test_steps_move_once_by_button_key_and_stick(browser: Browser) -> None:
         def choose(name: str, value: str) -> None:
             page.locator(f"#jog [name={name}][value='{value}'] + span").click()
 
+        for code, angle in (("KeyO", 0.3), ("KeyC", -0.4)):
+            page.evaluate("(code) => steps.key({ type: 'keydown', code }, {})", code)
+            assert said() == [{"do": "gripper", "angle": angle}]
+        page.locator("#gripper button", has_text="Open").click()
+        assert said() == [{"do": "gripper", "angle": 0.3}]
         press = """([code, repeat]) => steps.key(
             { type: "keydown", code, repeat }, { KeyS: [0, -1] })"""
         assert page.evaluate(press, ["KeyS", False]) is False, "without a step it is held"
@@ -299,9 +301,6 @@ def test_steps_move_once_by_button_key_and_stick(browser: Browser) -> None:
         choose("step", "10")
         page.get_by_role("button", name="z minus 10 mm").click()
         assert said()[0]["by"] == [0, 0, -0.01, 0, 0]
-        for stick in (0.4, 0.9, 1.0, 0.0, 0.9):
-            page.evaluate("(x) => steps.deflect([x, 0, 0, 0, 0, 0, 0])", stick)
-        assert [message["by"][0] for message in said()] == [0.01, 0.01]
         # Joints move by steps only.
         choose("step", "0")
         choose("frame", "joints")
@@ -337,71 +336,6 @@ def test_elbow_of_seven_axes_moves_while_the_tool_rests(browser: Browser) -> Non
         page.locator("#jog [name=step][value='10'] + span").click()
         page.get_by_role("button", name="Elbow minus 10 °").click()
         assert page.evaluate("said.at(-1)") == pytest.approx(-0.174533, abs=1e-6)
-
-
-# Touch
-
-FEEL = """({ Rumble }, states, haptic) => {
-    const played = [];
-    const pulse = (value, duration) => played.push({ value, duration });
-    const playEffect = (_, effect) => (played.push(effect), Promise.resolve());
-    const pad = haptic
-        ? { connected: true, hapticActuators: [{ pulse }] }
-        : { connected: true, vibrationActuator: { playEffect } };
-    navigator.getGamepads = () => [null, pad];
-    navigator.vibrate = (duration) => played.push({ duration });
-    const rumble = new Rumble();
-    states.forEach((state, i) => rumble.take(state, 1000 * i));
-    return played;
-}"""
-"""Returns what the devices play for states that follow each other after a second."""
-
-
-def state(*reasons: str, **values: Any) -> dict[str, Any]:
-    """Return the part of a state that is felt: an arm that moves freely, with changes."""
-    force = values.pop("force", 0.0)
-    touch = {"force_limit": 10.0, "fingers": [{"force": force}, {"force": force}]}
-    margins = {"clearance": values.pop("clearance", 0.1), "limit": values.pop("limit", 1.0)}
-    findings = [{"reason": reason} for reason in reasons]
-    return {
-        **{"moving": True, "findings": findings, "margins": margins},
-        **{"touch": touch, "touching": [], **values},
-    }
-
-
-FELT = {
-    "free": (state(), None, None),
-    "rest": (state(moving=False, clearance=0.006, limit=0.01), None, None),
-    "near": (state(clearance=0.006), 0.0, (0.5, 1.0)),
-    "limit": (state(limit=0.01), 0.0, (0.5, 1.0)),
-    "blocked": (state("contact", moving=False), 0.0, (1.0, 1.0)),
-    "touch": (state(touching=["cup"]), 0.0, (0.6, 0.6)),
-    "grip": (state(force=5.0), 0.6, (0.2, 0.2)),
-    "sliding": (state("sliding", force=0.0), 1.0, (1.0, 1.0)),
-    "slipped": (state("slipped"), 1.0, (1.0, 1.0)),
-}
-"""Each event with the strength of the strong motor and the bounds of the weak one."""
-
-
-def test_each_event_is_felt_on_its_motor_and_on_the_phone(page: Page) -> None:
-    for name, (event, strong, weak) in FELT.items():
-        played = module(page, "touch/rumble.js", FEEL, [state(), event], False)
-        if weak is None:
-            assert played == [], name
-            continue
-        gamepad, phone = played
-        assert gamepad["strongMagnitude"] == pytest.approx(strong), name
-        assert weak[0] <= gamepad["weakMagnitude"] <= weak[1], name
-        strength = max(gamepad["strongMagnitude"], gamepad["weakMagnitude"])
-        assert phone["duration"] == pytest.approx(gamepad["duration"] * strength, abs=1.0), name
-        # The one motor of a gamepad in Firefox has the stronger of both.
-        (haptic, _) = module(page, "touch/rumble.js", FEEL, [state(), event], True)
-        assert haptic == {"value": strength, "duration": gamepad["duration"]}, name
-
-
-def test_rumble_knows_the_distance_at_which_the_arm_stops() -> None:
-    rumble = (STATIC / "touch" / "rumble.js").read_text(encoding="utf-8")
-    assert f"const MIN_CLEARANCE = {MIN_CLEARANCE:g};" in rumble
 
 
 # Teach
@@ -467,7 +401,8 @@ def test_broken_content_of_the_browser_is_refused(page: Page) -> None:
 
 
 CHANGED = """({ Content }) => {
-    const content = new Content(null, { name: "arm", joints: new Array(5).fill("") }, () => {});
+    const kept = { getItem: () => null, setItem() {} };
+    const content = new Content(kept, { name: "arm", joints: new Array(5).fill("") }, () => {});
     const names = [];
     const act = (name, ...values) => (content[name](...values), names.push(content.now.name));
     act("change", { name: "one" });
@@ -491,41 +426,7 @@ def test_changes_of_taught_poses_are_undone_and_done_again(page: Page) -> None:
     assert (undoable, redoable) == (False, True)
 
 
-# Instruments and timeline
-
-CATALOGUE = [
-    {"id": "speed", "sizes": ["small", "large"], "shown": True},
-    {"id": "clearance", "sizes": ["small"], "shown": True},
-    {"id": "grip-forces", "sizes": ["small"], "shown": False},
-]
-
-SPEED = {"id": "speed", "size": "small", "shown": True}
-
-BROKEN = (
-    "{",
-    "null",
-    json.dumps({"version": 99, "places": []}),
-    json.dumps({"version": 1, "places": {"id": 3}}),
-    json.dumps({"version": 1, "places": [None, 7, {"id": "<b>", "size": "small", "shown": True}]}),
-    json.dumps({"version": 1, "places": [{"id": "speed", "size": "vast", "shown": "yes"}, SPEED]}),
-)
-
-
-def test_layout_of_instruments_is_repaired_and_arranged(page: Page) -> None:
-    path = "instruments/layout.js"
-    first = module(page, path, "({ initial }, all) => initial(all)", CATALOGUE)
-    read = "({ read }, all, text) => read({ getItem: () => text }, all)"
-    for text in BROKEN:
-        assert module(page, path, read, CATALOGUE, text) == first, text
-
-    def names(call: str) -> list[str]:
-        changed = module(page, path, f"(own, first) => own.{call}", first)
-        return [row["id"] for row in changed if row["shown"]]
-
-    assert names("moved(first, 'clearance', 'speed')") == ["clearance", "speed"]
-    assert names("nudged(first, 'speed', 1)") == ["clearance", "speed"]
-    assert names("nudged(first, 'speed', -1)") == ["speed", "clearance"]
-    assert names("changed(first, 'speed', { shown: false })") == ["clearance"]
+# Timeline
 
 
 def test_axis_of_the_timeline_is_that_of_the_server(page: Page) -> None:

@@ -1,9 +1,8 @@
-"""Forces of the fingers in a real browser: gauge, plot, and vibration of a gamepad and a phone."""
+"""Forces of the fingers in a real browser: gauge and plot."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,18 +19,6 @@ from tests.browser.sizes import WIDE
 OPEN, CLOSED = 0.3, -0.44
 ROD, ROD_AT = [0.015, 0.31], (0.4477, 0.0)
 """[m] Radius and height of a rod, and its place below the fingers in the ready posture."""
-
-DEVICES = """
-    window.felt = [];
-    const playEffect = (kind, effect) => (felt.push({ kind, ...effect }), Promise.resolve());
-    const pad = {
-        connected: true, buttons: [], axes: [], vibrationActuator: { playEffect },
-    };
-    navigator.getGamepads = () => [null, pad];
-    navigator.vibrate = (ms) => felt.push({ kind: "phone", duration: ms });
-"""
-"""A gamepad and a phone that note what they play."""
-
 
 @pytest.fixture(scope="module")
 def arm(server: AppServer) -> Iterator[Client]:
@@ -54,9 +41,9 @@ def grip(arm: Client, angle: float) -> None:
 
 @pytest.fixture
 def page(server: AppServer, arm: Client, windows: Windows) -> Iterator[Page]:
-    """Return our own page without viser in its frame, with the devices."""
+    """Return our own page without viser in its frame."""
     grip(arm, CLOSED)
-    with windows.open(server.url, window=WIDE, drawing=Drawing.NONE, script=DEVICES) as page:
+    with windows.open(server.url, window=WIDE, drawing=Drawing.NONE) as page:
         yield page.page
         assert page.errors == []
 
@@ -67,9 +54,9 @@ def test_gauge_and_plot_show_the_force_of_each_finger(page: Page, arm: Client) -
     assert touch is not None
     forces = [finger.force for finger in touch.fingers]
     page.click("#instruments-button")
-    page.get_by_role("button", name="Arrange").click()
+    page.get_by_role("button", name="Choose").click()
     page.get_by_role("button", name="Forces of the fingers [N]", exact=True).click()
-    page.get_by_role("button", name="Arrange").click()
+    page.get_by_role("button", name="Choose").click()
     check_shown(page, [("finger right", forces[0]), ("finger left", forces[1])], "holds rod")
     grip(arm, OPEN)
     check_shown(page, [("finger right", 0.0), ("finger left", 0.0)], "empty hand")
@@ -84,37 +71,3 @@ def check_shown(page: Page, forces: list[tuple[str, float]], held: str) -> None:
     legend = page.locator("#instruments .card[data-id=grip-forces] .legend button")
     legend.first.scroll_into_view_if_needed()
     expect(legend).to_have_text([f"{name}{force:.2f}" for name, force in forces])
-
-
-def felt(page: Page) -> list[dict[str, Any]]:
-    """Return what the devices have played since the last call."""
-    pulses: list[dict[str, Any]] = page.evaluate("() => felt.splice(0)")
-    return pulses
-
-
-@pytest.mark.long
-def test_devices_vibrate_only_after_they_were_turned_on(page: Page, arm: Client) -> None:
-    grip(arm, OPEN)
-    page.click("#more-button")
-    button = page.get_by_role("button", name="Vibrate on touch")
-    assert button.get_attribute("aria-pressed") == "false"
-    assert felt(page) == []
-    button.click()
-    assert button.get_attribute("aria-pressed") == "true"
-    page.wait_for_timeout(200)
-    felt(page)
-    grip(arm, CLOSED)
-    page.wait_for_function("() => felt.some(({ strongMagnitude }) => strongMagnitude > 0.6)")
-    played = felt(page)
-    assert {pulse["kind"] for pulse in played} == {"dual-rumble", "phone"}
-    assert max(pulse.get("strongMagnitude", 0.0) for pulse in played) <= 1.0
-    assert all(pulse["duration"] > 0 for pulse in played)
-    # A force that lasts is not felt. States that were under way may still tell of the approach.
-    page.wait_for_timeout(200)
-    assert not [pulse for pulse in felt(page) if pulse.get("strongMagnitude")]
-    page.wait_for_timeout(200)
-    assert felt(page) == []
-    button.click()
-    grip(arm, OPEN)
-    grip(arm, CLOSED)
-    assert felt(page) == []

@@ -8,11 +8,13 @@ declare namespace Page {
 
   type Store = import("../../static/page/store.js").Store;
 
+  /** A storage of the browser; see `page/storage.js`. */
+  interface Kept { getItem(name: string): string | null; setItem(name: string, value: string): void; }
+
   /** What every part of the page gets. */
   interface Context {
     store: Store; say: Say; toast: Toast;
-    /** The storage of the browser; null if it refuses to store anything. */
-    kept: Storage | null;
+    kept: Kept;
     /** The frame of viser's page, the element round it, and the name of this page. */
     scene: HTMLIFrameElement; stage: HTMLElement; name: string;
   }
@@ -57,9 +59,6 @@ declare namespace Page {
 
   /** A message to it: a request, the address to open, the rate of states [Hz], or that a person acts. */
   interface Order { say?: Api.Act; open?: string; watch?: number; used?: boolean; }
-
-  /** A gamepad as Firefox has it, too. */
-  interface VibratingGamepad extends Gamepad { hapticActuators?: { pulse(strength: number, duration: number): void }[]; }
 
   interface LastEpisode { number: number; outcome: Outcome; seconds: number; missing_ticks: number; }
   type Outcome = "success" | "failure" | "unjudged" | "unfinished";
