@@ -45,7 +45,7 @@ browser: $(dev_ok)            ## find a Chromium, or install one
 octave: $(dev_ok)             ## find GNU Octave, or install it where that can be done
 	$(bin)/python tests/gateway/octave.py
 
-exchange: $(dev_ok)           ## find the programs that read our exports, and Firefox, or install them
+exchange: $(dev_ok)           ## find the programs that read our exports, or install them
 	$(bin)/python tests/exchange/tools.py
 
 # In four processes, as `tests/schedule.py` says. A test that fails, as it may be starved of time, is tried

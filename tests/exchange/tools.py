@@ -1,4 +1,4 @@
-"""Find the programs that read our exports, and Firefox; install them if nobody must confirm.
+"""Find the programs that read our exports; install them if nobody must confirm.
 
 ``python tests/exchange/tools.py`` installs them. Tests of a missing program are skipped.
 """
@@ -34,7 +34,6 @@ PACKAGES = {
     "xauth": "xauth",
     "xdotool": "xdotool",
     "view3dscene": "view3dscene",
-    "firefox-esr": "firefox-esr",
     "node": "nodejs",
     PIVY: "python3-pivy",
 }
@@ -215,7 +214,7 @@ def main() -> None:
     print(
         f"Some tests are skipped; on Debian and Ubuntu: apt-get install {' '.join(packages)}"
         if packages
-        else "The programs that read our exports, and Firefox, are all here."
+        else "The programs that read our exports are all here."
     )
 
 
