@@ -22,7 +22,7 @@ from tests.browser.conftest import Windows
 from tests.browser.server import APP, AppServer
 from tests.browser.session import READY, Truth
 from tests.browser.sizes import PHONE, SIZES, WIDE, in_sizes_and_schemes
-from tests.browser.test_accessibility import AXE, VIOLATIONS
+from tests.browser.test_accessibility import findings
 from tests.real_arm.emulated import emulator_process
 
 SECONDS = 20_000
@@ -200,6 +200,4 @@ def test_card_fits_and_is_accessible(
     assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
     card.press("calibrate")
     card.window.keep(artefacts / f"arm-card-asks-{size}-{scheme}.png")
-    if AXE.exists():
-        page.evaluate(AXE.read_text(encoding="utf-8"))
-        assert page.evaluate(VIOLATIONS) == []
+    assert findings(page) == []

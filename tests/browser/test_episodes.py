@@ -18,7 +18,7 @@ from tests.browser.page import ViserPage
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.browser.session import bar
 from tests.browser.sizes import PHONE, PORTRAIT, WIDE
-from tests.browser.test_accessibility import AXE, VIOLATIONS
+from tests.browser.test_accessibility import findings
 from tests.gateway.client import ask, enter
 
 POSTURES = ((0.3, -1.0, 1.4, 0.3, 0.0), (-0.3, -1.0, 1.4, 0.3, 0.5))
@@ -131,7 +131,7 @@ def test_whole_flow_on_a_phone(open_page: OpenPage, server: AppServer, artefacts
     move(server, *POSTURES)
     page.keep(artefacts / "episodes-phone-running.png")
     assert_fits(page)
-    assert_accessible(page)
+    assert findings(page.page) == []
     tap(page, "Success")
     page.wait_until(lambda: outcomes(server) == ["success"], "the success")
     sheet.locator("summary").first.tap()
@@ -160,13 +160,6 @@ def test_whole_flow_on_a_phone(open_page: OpenPage, server: AppServer, artefacts
 
 def tap(page: ViserPage, name: str) -> None:
     page.page.locator("#episodes").get_by_role("button", name=name).first.tap()
-
-
-def assert_accessible(page: ViserPage) -> None:
-    """Check names and contrast of all controls by axe-core, which `make check-js` fetches."""
-    if AXE.exists():
-        page.page.evaluate(AXE.read_text(encoding="utf-8"))
-        assert page.page.evaluate(VIOLATIONS) == []
 
 
 def assert_fits(page: ViserPage) -> None:
@@ -213,7 +206,7 @@ def test_windows_agree_and_a_reload_keeps_rec(
     first.wait_until(lambda: rec(first) == "REC", "the end")
     second.page.locator("#episodes summary").first.click()
     second.keep(artefacts / "episodes-desk.png")
-    assert_accessible(second)
+    assert findings(second.page) == []
     assert second.page.locator("#episodes i.success").inner_text() == "Success"
     # While Jog is open, its keys move the arm, and those of episodes are others.
     second.page.focus("#jog-button")

@@ -64,7 +64,7 @@ def test_a_held_key_turns_the_tool_about_the_vertical(six: ViserPage) -> None:
     assert not six.errors
 
 
-def test_instruments_are_those_of_the_arm(six: ViserPage) -> None:
+def test_instruments_steps_gizmo_and_branches_are_those_of_the_arm(six: ViserPage) -> None:
     show(six, True)
     titles = [
         card.get_attribute("aria-label") for card in six.page.locator("#instruments .card").all()
@@ -81,10 +81,7 @@ def test_instruments_are_those_of_the_arm(six: ViserPage) -> None:
     cards = six.page.locator("#instruments .card")
     for name in ("touch", "grip-forces", "gripper"):
         assert not cards.and_(six.page.locator(f"[data-id={name}]")).count()
-    assert not six.errors
-
-
-def test_steps_of_joints_are_in_rows_whatever_their_names(six: ViserPage) -> None:
+    # Steps of joints are in rows, whatever their names.
     six.page.click("#jog-button")
     six.page.get_by_text("Joints", exact=True).click()
     buttons = six.page.locator("#steps button")
@@ -93,10 +90,6 @@ def test_steps_of_joints_are_in_rows_whatever_their_names(six: ViserPage) -> Non
     places = [(round(box["y"]), round(box["height"])) for box in boxes if box is not None]
     rows = [places[column : column + 2] for column in range(0, 12, 2)]
     assert rows == [rows[0]] * 3 + [rows[3]] * 3
-    assert not six.errors
-
-
-def test_gizmo_has_arrows_and_rings_and_branches_have_names(six: ViserPage) -> None:
     names = six.frame.evaluate("() => Object.keys(__viserMutable.nodeRefFromName)")
     assert "/target/move" in names
     assert "/target/move/turn" in names
