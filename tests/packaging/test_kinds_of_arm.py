@@ -62,19 +62,3 @@ def test_arms_are_asked_what_they_can_do() -> None:
     ]
     message = "Add a property to `Kinematics` or `ToolKinematics` instead:\n" + "\n".join(places)
     assert len(places) <= MAX_DISTINCTIONS, message
-
-
-def test_every_way_to_tell_kinds_apart_is_counted() -> None:
-    source = """
-if isinstance(arm, Panda):
-    solver = cast(Solver, arm.solver)
-if isinstance(arm, Panda | Robot) or issubclass(type(arm), Kinematics):
-    isinstance(arm, Robot)
-match arm:
-    case Panda():
-        Panda()
-"""
-    lines = sorted(distinctions(ast.parse(source), {"Panda", "Kinematics", "Solver"}))
-    assert lines == [2, 3, 4, 4, 7]
-    tree = ast.parse("class Panda(Kinematics): pass\nclass Other(Panda): pass\nclass Robot: pass")
-    assert kinds({Path(): tree}) - INTERFACES == {"Panda", "Other"}

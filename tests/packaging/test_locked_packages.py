@@ -26,7 +26,6 @@ MAX_SIZE = 330
 OWN = 6
 """[MiB] The data of the robot and the page, which an editable installation copies."""
 
-MOTION = "t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n0.5,1,-1.19,1.48,0.14\n"
 VRML = """#VRML V2.0 utf8
 Shape { geometry IndexedFaceSet {
   coord Coordinate { point [0 0 0, 30 0 0, 0 30 0, 0 0 30] }
@@ -89,25 +88,6 @@ def test_libraries_are_loaded_on_use_only(python: Path, tmp_path: Path) -> None:
         f"import katana450; katana450.load(); print(*filter(sys.modules.get, {LOADED_ON_USE}))"
     )
     assert run(tmp_path, python, "-c", words).split() == []
-
-
-def test_films_ask_for_an_extra(python: Path, tmp_path: Path) -> None:
-    (tmp_path / "m.csv").write_text(MOTION, encoding="utf-8")
-    words = ("--trajectory", "m.csv", "--size", "64x48", "--fps", "4", "--out", "m.mp4")
-    katana450 = python.parent / "katana450"
-    assert "the extra 'pictures'" in run(tmp_path, katana450, "render", *words, status=1)
-    assert [path.name for path in tmp_path.iterdir()] == ["m.csv"]
-
-
-@pytest.mark.long
-def test_demo_writes_its_report_without_pictures(python: Path, tmp_path: Path) -> None:
-    """The command of the README."""
-    katana450 = python.parent / "katana450"
-    said = run(tmp_path, katana450, "demo", "circle", "--headless", "--report", "out")
-    assert said.count("the extra 'pictures'") == 1
-    names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names >= {"report.html", "report.json", "trace.csv", "path.png", "joints.png"}
-    assert "tracing.png" not in names
 
 
 @pytest.mark.long

@@ -114,24 +114,6 @@ def test_one_module_makes_calls_that_only_some_systems_have() -> None:
             assert names <= allowed, f"{path}: put this into platform_support.py"
 
 
-@pytest.mark.parametrize(
-    ("source", "name"),
-    [
-        ("import resource", "resource"),
-        ("from fcntl import flock", "fcntl"),
-        ("os.setpriority(0, 0, 1)", "setpriority"),
-        ("signal.signal(signal.SIGTERM, f)", "SIGTERM"),
-        ("select.poll()", "poll"),
-        ("getattr(socket, 'TCP_INFO', None)", "TCP_INFO"),
-        ("Popen(x, start_new_session=True)", "start_new_session"),
-        ("open('/proc/cpuinfo')", "/proc/cpuinfo"),
-        ("get_context('fork')", "fork"),
-    ],
-)
-def test_such_calls_are_found(source: str, name: str) -> None:
-    assert name in set(used_names(source))
-
-
 @pytest.fixture
 def windows(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, tuple[Any, ...]]]:
     """Pretend to be Windows; return the recorded calls of its libraries, with arguments."""
