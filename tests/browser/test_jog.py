@@ -20,6 +20,7 @@ from tests.browser.session import Truth, camera, clear_stop
 EXACT = 2e-6
 """[m] Tolerance of one step."""
 
+
 @pytest.fixture
 def sheet(own_page: ViserPage) -> Iterator[ViserPage]:
     """Return our page with the Jog sheet and its steps open."""

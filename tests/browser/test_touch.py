@@ -20,6 +20,7 @@ OPEN, CLOSED = 0.3, -0.44
 ROD, ROD_AT = [0.015, 0.31], (0.4477, 0.0)
 """[m] Radius and height of a rod, and its place below the fingers in the ready posture."""
 
+
 @pytest.fixture(scope="module")
 def arm(server: AppServer) -> Iterator[Client]:
     """Return a program that drives, with a rod that stands between the open fingers."""
