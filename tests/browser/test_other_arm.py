@@ -95,10 +95,10 @@ def test_instruments_steps_gizmo_and_branches_are_those_of_the_arm(six: ViserPag
     assert "/target/move/turn" in names
     assert "/target/move/roll" not in names
     six.frame.get_by_text("Branches", exact=True).click()
-    rows = six.frame.locator("tr[data-branch]")
-    rows.first.wait_for()
-    assert rows.count() == 8
-    assert "left-up-noflip" in {rows.nth(k).get_attribute("data-branch") for k in range(8)}
+    branches = six.frame.locator("tr[data-branch]")
+    branches.first.wait_for()
+    assert branches.count() == 8
+    assert "left-up-noflip" in {branches.nth(k).get_attribute("data-branch") for k in range(8)}
     assert not six.errors
 
 
