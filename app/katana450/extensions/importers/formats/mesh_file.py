@@ -16,7 +16,7 @@ from katana450.extensions.importers.formats.shape_file import (
     ShapeFile,
     Up,
 )
-from katana450.extensions.importers.guarded_reading import ReadCompanion, read_shape_guarded
+from katana450.extensions.importers.guarded_reading import read_shape_guarded
 
 HULL_DISTANCE_TO_REPORT = 2e-3
 """[m] Distance of a hull from its mesh from which it is reported."""
@@ -32,7 +32,6 @@ def read_mesh(
     up: Up | None = None,
     *,
     main: str = "",
-    companion: ReadCompanion | None = None,
 ) -> Mesh:
     """Return the mesh in a file, read in a subprocess within some seconds.
 
@@ -42,13 +41,12 @@ def read_mesh(
         unit: a key of UNITS; None to guess it.
         up: axis that points up, as in `read_shape`.
         main: path of the shape file in a .zip, as in `read_shape`.
-        companion: returns the content of a file in the same folder, as in `read_shape_guarded`.
 
     Raises InputError with the defect of the file.
     """
     format = Format.of(file)
     metres = None if unit is None else unit_of(unit)
-    shape, body = read_shape_guarded(data, format, file, metres, up, main=main, companion=companion)
+    shape, body = read_shape_guarded(data, format, file, metres, up, main=main)
     sign = next(sign for sign, length in UNITS.items() if length == shape.unit)
     low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
     foot = np.array((*(0.5 * (low + high)[:2]), low[2]))

@@ -63,24 +63,11 @@ def written(scene: Scene, files: Mapping[str, MeshFile], T_palm_tool: FloatArray
     entry["objects"] = [
         _object_entry(scene_object, files, T_palm_tool) for scene_object in scene.objects
     ]
-    body: str = yaml.dump(entry, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+    # Lists of numbers are on one line.
+    body: str = yaml.safe_dump(
+        entry, sort_keys=False, allow_unicode=True, width=100, default_flow_style=None
+    )
     return HEAD + body
-
-
-class _Dumper(yaml.SafeDumper):  # type: ignore[misc]  # PyYAML has no types
-    """A YAML dumper that writes lists of numbers on one line."""
-
-    def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002
-        """Return True, so that repeated values are written in full."""
-        return True
-
-    def represent_list(self, data: list[object]) -> yaml.Node:
-        """Return the node of a list; a list of numbers is on one line."""
-        plain = all(isinstance(number, int | float) for number in data)
-        return self.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=plain)
-
-
-_Dumper.add_representer(list, _Dumper.represent_list)
 
 
 def _object_entry(
@@ -265,14 +252,8 @@ def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
             f"{sha256}. To use it nevertheless, remove `sha256`."
         )
 
-    def companion(name: str, maximum: int) -> bytes | None:
-        try:
-            return opened(str(parts.parent / name), maximum)
-        except InputError:
-            return None
-
     up = None if file.up is None else Up(file.up)
-    return read_mesh(content, file.path, file.unit, up, companion=companion)
+    return read_mesh(content, file.path, file.unit, up)
 
 
 def _text(content: bytes, name: str) -> str:

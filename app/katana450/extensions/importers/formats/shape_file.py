@@ -1,4 +1,4 @@
-"""Shapes of other programs as triangles in metres, z up: meshes and worlds in seven formats.
+"""Shapes of other programs as triangles in metres, z up: meshes and worlds in six formats.
 
 Files are untrusted. Readers see no file but those of the same upload, execute nothing, and stop at
 limits of their own. `read_shape_guarded` adds limits of the system, in a disposable subprocess.
@@ -19,7 +19,6 @@ from katana450.errors import InputError, digits_beyond
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, Companions, packed, unpacked
 from katana450.extensions.importers.formats.gltf_file import read_gltf
 from katana450.extensions.importers.formats.obj_file import read_obj
-from katana450.extensions.importers.formats.ply_file import read_ply
 from katana450.extensions.importers.formats.stl_file import read_stl
 from katana450.extensions.importers.formats.surface import MeshReading, MeshSurface
 from katana450.extensions.importers.formats.vrml_file import read_wrl
@@ -61,7 +60,6 @@ class Format(Enum):
     WRL = "wrl"
     STL = "stl"
     OBJ = "obj"
-    PLY = "ply"
     GLB = "glb"
     GLTF = "gltf"
     THREEMF = "3mf"
@@ -138,7 +136,6 @@ def read_shape(
     up: Up | None = None,
     *,
     main: str = "",
-    missing: list[str] | None = None,
 ) -> ShapeFile:
     """Return the shape in a file.
 
@@ -149,7 +146,6 @@ def read_shape(
         unit: its unit [m]; None to guess it.
         up: its axis that points up; None for the default of the format.
         main: path of the shape file in a .zip; chosen if it is left out.
-        missing: gets the paths of files that it names and that are not there, also before an error.
 
     Raises ChoiceError for a .zip of several shapes, and InputError for a file that is corrupt, too
     large, or of another format.
@@ -168,9 +164,6 @@ def read_shape(
         reading = _read(data, format, file, companions)
     except RecursionError as error:
         raise InputError(f"{file} is corrupt: its parts are nested too deeply.") from error
-    finally:
-        if missing is not None:
-            missing += companions.missing
     reading = _in_known_unit(reading)
     surface = reading.surface.tidy()
     left_out = [*reading.left_out, *_degenerate(reading.surface, surface)]
@@ -251,8 +244,6 @@ def _read(data: bytes, format: Format, file: str, companions: Companions) -> Mes
             return read_stl(data, file)
         case Format.OBJ:
             return read_obj(data, file, companions)
-        case Format.PLY:
-            return read_ply(data, file)
         # The library for this format takes longer to import than a file takes to read.
         case Format.THREEMF:
             from katana450.extensions.importers.formats.threemf_file import read_3mf

@@ -6,8 +6,10 @@ of concave polygons.
 
 from __future__ import annotations
 
+import warnings
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -316,3 +318,21 @@ def as_bytes(colours: Iterable[Sequence[float]] | FloatArray) -> Colours:
     """Return colours 0..1 as bytes (m, 4); values outside are clipped."""
     rows = np.nan_to_num(np.asarray(colours, dtype=np.float64))
     return np.rint(np.clip(rows, 0.0, 1.0) * 255.0).astype(np.uint8).reshape(-1, 4)
+
+
+@contextmanager
+def failures_in_words(name: str) -> Iterator[None]:
+    """Raise InputError about the file ``name`` for any exception of a library in the block."""
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            # Older numpy only warns about text that is not a number.
+            warnings.filterwarnings("error", message="string or file could not be read")
+            yield
+    except (InputError, MemoryError, RecursionError):
+        raise
+    except (IndexError, KeyError, StopIteration) as error:
+        raise InputError(f"{name} is corrupt: it refers to a part that is missing.") from error
+    except Exception as error:
+        reason = " ".join(str(error).split())[:120].rstrip(".")
+        raise InputError(f"{name} is corrupt: {reason or type(error).__name__}.") from error

@@ -14,12 +14,12 @@ import numpy as np
 from trimesh.exchange.threemf import load_3MF
 
 from katana450.errors import InputError
-from katana450.extensions.importers.formats.library_errors import failures_in_words
 from katana450.extensions.importers.formats.surface import (
     MAX_COPIES,
     MeshBuilder,
     MeshReading,
     MeshSurface,
+    failures_in_words,
     of_polygons,
 )
 from katana450.extras import require
