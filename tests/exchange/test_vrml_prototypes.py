@@ -139,10 +139,9 @@ def test_a_file_of_the_same_name_in_another_folder_is_not_the_file_itself() -> N
 
 def test_no_file_outside_of_the_upload_is_read() -> None:
     for url in ("../secret.wrl", "/etc/passwd", "file:///etc/passwd", "C:\\\\secret.wrl"):
-        missing: list[str] = []
         data = f'{HEADER}\nInline {{ url "{url}" }}'.encode()
         with pytest.raises(InputError, match="not there"):
-            read_shape(data, Format.WRL, "a.wrl", missing=missing)
+            read_shape(data, Format.WRL, "a.wrl")
 
 
 def test_worlds_that_show_each_other_end() -> None:

@@ -14,7 +14,7 @@ import pytest
 from katana450 import extras
 from katana450.cli.main import main
 from katana450.extensions.importers.formats.shape_file import Format
-from katana450.extensions.importers.reading import answer
+from katana450.extensions.importers.guarded_reading import answer
 from katana450.extensions.real_arm.driver.katana_driver import driver_of
 from katana450.extensions.real_arm.link import ArmUrl
 from katana450.extras import MissingExtraError

@@ -87,12 +87,6 @@ MAX_FILES = 1000
 COMPANION_SUFFIXES = ("bin", "mtl")
 """Suffixes of files that shape files name, and that are no shapes themselves."""
 
-NAMING = ("wrl", "gltf", "obj")
-"""Suffixes of files that can name others."""
-
-LONGEST_NAME = 200
-"""[bytes] Maximum length of the name of a file in another."""
-
 SCENE = "scene.yaml"
 """A file that makes a .zip a scene instead."""
 
@@ -159,7 +153,7 @@ def unpacked(
     """Return the path of the shape file in a .zip, and the contents of its files by their paths.
 
     Pictures and other files that no reader opens are not unpacked. The shape file is ``main``, or
-    the one that the comment of the .zip names, or the only one that no other names.
+    the one that the comment of the .zip names, or the only one in the highest folder.
 
     Args:
         data: content of the .zip.
@@ -182,10 +176,10 @@ def unpacked(
 
     files, comment = contents(data, name, MAX_FILES, wanted)
     listed = [path for path in files if path.lower().endswith(shapes)]
-    return _main(listed, files, name, main or (comment if comment in listed else "")), files
+    return _main(listed, name, main or (comment if comment in listed else "")), files
 
 
-def _main(listed: list[str], files: Mapping[str, bytes], name: str, main: str) -> str:
+def _main(listed: list[str], name: str, main: str) -> str:
     """Return the path of the shape file among those ``listed``."""
     if main:
         if main not in listed:
@@ -193,10 +187,8 @@ def _main(listed: list[str], files: Mapping[str, bytes], name: str, main: str) -
         return main
     if not listed:
         raise InputError(f"There is no file in {name} that can be read as a shape.")
-    named = _named(files, listed)
-    free = [path for path in listed if posixpath.basename(path).casefold() not in named] or listed
-    depth = min(path.count("/") for path in free)
-    top = [path for path in free if path.count("/") == depth]
+    depth = min(path.count("/") for path in listed)
+    top = [path for path in listed if path.count("/") == depth]
     alike = [path for path in top if _stem(path) == _stem(name)]
     for candidates in (top, alike):
         if len(candidates) == 1:
@@ -208,25 +200,6 @@ def _main(listed: list[str], files: Mapping[str, bytes], name: str, main: str) -
 
 def _stem(path: str) -> str:
     return posixpath.splitext(posixpath.basename(path))[0].casefold()
-
-
-def _named(files: Mapping[str, bytes], listed: Iterable[str]) -> set[str]:
-    """Return those names of the shape files ``listed`` that are in the text of another file."""
-    names = {posixpath.basename(path).casefold() for path in listed}
-    endings = "|".join(sorted({re.escape(posixpath.splitext(file)[1]) for file in names}))
-    pattern = re.compile(f"({endings})\\b".encode(), re.IGNORECASE)
-    named: set[str] = set()
-    for path, content in files.items():
-        if not path.lower().endswith(NAMING):
-            continue
-        for match in pattern.finditer(content):
-            before = content[max(match.end() - LONGEST_NAME, 0) : match.end()]
-            word = re.split(r"[\"'/\\\\\n]", before.decode("utf-8", "replace"))[-1].casefold()
-            # An OBJ file names its materials after a blank.
-            named |= {word, word.rpartition(" ")[2]} & (
-                names - {posixpath.basename(path).casefold()}
-            )
-    return named
 
 
 def packed(main: str, files: Mapping[str, bytes]) -> bytes:

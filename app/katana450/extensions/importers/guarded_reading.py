@@ -1,4 +1,9 @@
-"""Reading of an untrusted shape file in a disposable subprocess."""
+"""Reading of an untrusted shape file in a disposable subprocess.
+
+`read_shape_guarded` starts this module with the words FORMAT NAME UNIT UP MAIN. The subprocess
+limits its memory and time before it reads the file from standard input, and writes a
+``ShapeReading``.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +12,16 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from katana450.disk_cache import decoded
-from katana450.errors import InputError
-from katana450.extensions.convex_body import ConvexBody
-from katana450.extensions.importers.archive import ChoiceError, is_inside, packed
+from katana450.disk_cache import decoded, encoded
+from katana450.errors import InputError, KatanaError
+from katana450.extensions.convex_body import ConvexBody, convex_body
+from katana450.extensions.importers.archive import ChoiceError
 from katana450.extensions.importers.formats.shape_file import (
-    MAX_FILE_BYTES,
     MAX_MEMORY_BYTES,
     SECONDS,
     Format,
@@ -26,18 +29,13 @@ from katana450.extensions.importers.formats.shape_file import (
     Up,
     check_file,
     label,
+    read_shape,
 )
 from katana450.maths.planning.checkpoint import checkpoint
-from katana450.platform_support import hanging_time
+from katana450.platform_support import hanging_time, limit_resources
 
 CHECK_EVERY = 0.1
 """[s] Interval at which a cancellation is checked."""
-
-MAX_PASSES = 8
-"""Maximum number of readings of a file whose companions name further files."""
-
-MAX_COMPANIONS = 500
-"""Maximum number of files that a file may name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,20 +46,12 @@ class ShapeReading:
         shape, body: the shape and its convex body; None if the file is refused.
         error: the reason for that.
         choices: paths of shape files, one of which must be chosen.
-        missing: paths of files that are named and not there.
     """
 
     shape: ShapeFile | None = None
     body: ConvexBody | None = None
     error: str = ""
     choices: tuple[str, ...] = ()
-    missing: tuple[str, ...] = ()
-
-
-ReadCompanion = Callable[[str, int], bytes | None]
-"""A function that returns the content of a file by its path in the folder of the shape file, up to
-one byte more than a maximum; None if it is not there.
-"""
 
 
 def read_shape_guarded(
@@ -72,31 +62,17 @@ def read_shape_guarded(
     up: Up | None = None,
     *,
     main: str = "",
-    companion: ReadCompanion | None = None,
 ) -> tuple[ShapeFile, ConvexBody]:
     """Return the result of `read_shape`, and its convex body, from a subprocess.
 
     The subprocess has `SECONDS` of processor time and, where the system supports it,
-    `MAX_MEMORY_BYTES`. ``companion`` is asked for the files that the file names; their paths never
-    lead out of its folder. Then the file is read again with them. Raises InputError as
-    `read_shape`, at these limits, and after a crash; and the error of a `checkpoint`, which ends
-    the subprocess.
+    `MAX_MEMORY_BYTES`. Raises InputError as `read_shape`, at these limits, and after a crash; and
+    the error of a `checkpoint`, which ends the subprocess.
     """
     file = label(name)
     check_file(data, file, unit, format)
     words = ["" if unit is None else str(float(unit)), "" if up is None else up.value]
-    own = Path(name.replace("\\", "/")).name or f"shape.{format.value}"
-    companions: dict[str, bytes] = {}
     answer = _parsed(data, [format.value, file, *words, main], file)
-    # What a .zip names is in it.
-    for _ in range(0 if format is Format.ZIP else MAX_PASSES):
-        left = MAX_FILE_BYTES - len(data) - sum(map(len, companions.values()))
-        more = _companions(answer, companion, companions.keys() | {own}, file, left)
-        if not more:
-            break
-        companions |= more
-        bundle = packed(own, {own: data} | companions)
-        answer = _parsed(bundle, [Format.ZIP.value, file, *words, own], file)
     if answer.choices:
         raise ChoiceError(answer.error, answer.choices)
     if answer.shape is None or answer.body is None:
@@ -104,38 +80,12 @@ def read_shape_guarded(
     return answer.shape, answer.body
 
 
-def _companions(
-    answer: ShapeReading, companion: ReadCompanion | None, known: set[str], file: str, left: int
-) -> dict[str, bytes]:
-    """Return those files beside a file that it names and that are not ``known`` yet.
-
-    Raises InputError once they have more than ``left`` bytes; no further one is then read.
-    """
-    if companion is None:
-        return {}
-    paths = [path for path in answer.missing if is_inside(path) and path not in known]
-    if len(paths) + len(known) > MAX_COMPANIONS:
-        raise InputError(f"{file} names more than {MAX_COMPANIONS} other files.")
-    contents: dict[str, bytes] = {}
-    for path in paths:
-        content = companion(path, left)
-        if content is None:
-            continue
-        contents[path] = content
-        left -= len(content)
-        if left < 0:
-            raise InputError(
-                f"{file} and the files that it names have over {MAX_FILE_BYTES // 1_000_000} MB."
-            )
-    return contents
-
-
 def _parsed(data: bytes, words: list[str], file: str) -> ShapeReading:
     """Return the answer of a new subprocess that reads ``data``."""
     # One thread, because a pool for every core would take address space, which is limited.
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     with subprocess.Popen(
-        [sys.executable, "-m", "katana450.extensions.importers.reading", *words],
+        [sys.executable, "-m", "katana450.extensions.importers.guarded_reading", *words],
         # The parent folder of the package.
         cwd=Path(__file__).resolve().parents[3],
         env=environment,
@@ -178,3 +128,40 @@ def _send(pipe: IO[bytes], data: bytes) -> None:
     # A process that has ended reads nothing.
     with suppress(OSError), pipe:
         pipe.write(data)
+
+
+def bind() -> None:
+    """Limit the memory and time of this process, as far as the system supports it."""
+    limit_resources(MAX_MEMORY_BYTES, round(SECONDS))
+
+
+def answer(
+    data: bytes, format: Format, name: str, unit: float | None, up: Up | None, main: str
+) -> ShapeReading:
+    """Return the answer for a file; arguments as those of `read_shape`."""
+    try:
+        shape = read_shape(data, format, name, unit, up, main=main)
+        body = convex_body(shape.vertices * shape.scale).scaled(1.0 / shape.scale)
+    except KatanaError as error:
+        choices = error.choices if isinstance(error, ChoiceError) else ()
+        return ShapeReading(error=str(error), choices=choices)
+    return ShapeReading(shape, body)
+
+
+def main(arguments: list[str]) -> None:
+    """Read one file. The process fails only at the limits of memory and time."""
+    bind()
+    format, name, unit, up, chosen = arguments
+    reading = answer(
+        sys.stdin.buffer.read(),
+        Format(format),
+        name,
+        float(unit) if unit else None,
+        Up(up) if up else None,
+        chosen,
+    )
+    sys.stdout.buffer.write(encoded(reading))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
