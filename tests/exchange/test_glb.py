@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -66,34 +64,6 @@ def test_colours_and_normals_are_preserved(katana: Robot) -> None:
         assert np.abs(a - b).max() <= 1
         np.testing.assert_allclose(own.vertex_normals, mesh.vertex_normals, atol=1e-5)
         np.testing.assert_allclose(own.vertices, mesh.vertices, atol=1e-7)
-
-
-def chunks(content: bytes) -> tuple[dict[str, Any], bytes]:
-    magic, version, length = struct.unpack_from("<4sII", content)
-    assert (magic, version, length) == (b"glTF", 2, len(content))
-    size, kind = struct.unpack_from("<I4s", content, 12)
-    assert kind == b"JSON"
-    gltf = json.loads(content[20 : 20 + size])
-    binary, kind = struct.unpack_from("<I4s", content, 20 + size)
-    assert kind == b"BIN\0"
-    body = content[28 + size :]
-    assert len(body) == binary == gltf["buffers"][0]["byteLength"]
-    return gltf, body
-
-
-def test_nodes_describe_their_joints(gantry: Robot) -> None:
-    ((_, content),) = glb_files(gantry, gantry.values(())).items()
-    gltf, _ = chunks(content)
-    extras = {n["name"]: n["extras"]["joint"] for n in gltf["nodes"] if "extras" in n}
-    assert extras["cart"] == {
-        "name": "rail",
-        "type": "prismatic",
-        "axis": [1.0, 0.0, 0.0],
-        "lower": -0.4,
-        "upper": 0.4,
-    }
-    assert "lower" not in extras["mast"]
-    assert extras["thumb"]["mimic"] == {"joint": "grip", "multiplier": -0.1, "offset": -0.04}
 
 
 VALIDATE = """

@@ -13,7 +13,6 @@ from katana450.assembly.robot_session import find_arm
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.c_source import c_files
-from katana450.extensions.export.formats import FORMATS, named
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.mjcf import mjcf_files
 from katana450.extensions.export.urdf_package import package_files
@@ -24,13 +23,9 @@ from katana450.extensions.export.vrml.vrml_files import (
     x3d_files,
 )
 
-LARGE_BYTES = 20_000_000
-"""Size [bytes] of all files together above which the command says why."""
-
 
 def export(options: argparse.Namespace) -> int:
     """Write the files of one format; print their names and sizes. Raises InputError."""
-    _check(options)
     robot = read_robot(options.urdf)
     robot.check_complete()
     robot.read_shapes()
@@ -46,14 +41,6 @@ def export(options: argparse.Namespace) -> int:
     write_files({folder / name: writer_of(content) for name, content in files.items()})
     for name, content in files.items():
         print(f"{folder / name}: {len(content)} bytes")
-    total = sum(map(len, files.values()))
-    if total > LARGE_BYTES:
-        triangles = sum(len(shape.faces) for link in robot.links for shape in link.shapes)
-        print(
-            f"katana450: These are {total / 1e6:.0f} MB, because the meshes have {triangles:,} "
-            "triangles. Reduce the mesh files to get smaller ones; glb is the smallest format.",
-            file=sys.stderr,
-        )
     return 0
 
 
@@ -72,14 +59,3 @@ def _files(options: argparse.Namespace, robot: Robot) -> Mapping[str, bytes]:
     objects = initial_objects(robot) if options.objects else ()
     world = world_of(robot, values, objects, plain=options.plain)
     return (vrml_files if options.format == "vrml" else x3d_files)(robot, world)
-
-
-def _check(options: argparse.Namespace) -> None:
-    """Raise InputError for an option that the format cannot follow."""
-    kind: str = options.format
-    row = FORMATS[kind]
-    if options.trajectory is not None or options.run is not None:
-        raise InputError(f"{kind} has no motion. Use --trajectory or --run with html.")
-    if options.pose and not row.posed:
-        names = ", ".join(named(lambda listed: listed.posed))
-        raise InputError(f"{kind} has no pose. Use --pose with {names}.")

@@ -1,4 +1,4 @@
-"""A robot as binary glTF 2.0: one node per link, its joint in `extras`."""
+"""A robot as binary glTF 2.0: one node per link."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from katana450.arm.robot.glb_file import GlbFile
-from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.errors import InputError
@@ -62,8 +62,6 @@ class _Document:
         children = [self._number[child.name] for child in self._robot.children(link)]
         if children:
             node["children"] = children
-        if joint is not None:
-            node["extras"] = {"joint": _joint_extras(joint)}
         if link.shapes:
             node["mesh"] = len(self._meshes)
             primitives = [self._primitive(shape) for shape in link.shapes]
@@ -97,21 +95,3 @@ def _material(material: Material) -> dict[str, Any]:
             "roughnessFactor": material.rough,
         },
     }
-
-
-def _joint_extras(joint: Joint) -> dict[str, Any]:
-    extras: dict[str, Any] = {
-        "name": joint.name,
-        "type": "prismatic" if joint.slides else "revolute",
-        "axis": joint.axis.tolist(),
-    }
-    for side, limit in (("lower", joint.lower), ("upper", joint.upper)):
-        if math.isfinite(limit):
-            extras[side] = limit
-    if joint.leader != joint.name:
-        extras["mimic"] = {
-            "joint": joint.leader,
-            "multiplier": joint.factor,
-            "offset": joint.offset,
-        }
-    return extras

@@ -1,18 +1,64 @@
-"""Options of ``katana450 export``, and the choice of the format."""
+"""Options of ``katana450 export``, and the table of its formats: one row each."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from katana450.cli.option_values import add_arm_options
 from katana450.errors import InputError
-from katana450.extensions.export.formats import FORMATS, named
+
+
+class ExportFormat(NamedTuple):
+    """A row of the table.
+
+    Attributes:
+        help: description for the help of the command.
+        posed: whether it is written at a pose.
+        scene: whether it has the objects of a new server, and a Switch for each shape.
+        moves: whether it is a page, a single file that plays a motion.
+    """
+
+    help: str
+    posed: bool = False
+    scene: bool = False
+    moves: bool = False
+
+
+FORMATS: Mapping[str, ExportFormat] = {
+    "vrml": ExportFormat(
+        "a VRML97 world and one file per part, for LabVIEW, Simulink and X3D browsers",
+        posed=True,
+        scene=True,
+    ),
+    "x3d": ExportFormat("the same world as X3D in XML", posed=True, scene=True),
+    "c": ExportFormat(
+        "C arrays and a draw function per link, kinematics, and an OpenGL viewer", posed=True
+    ),
+    "glb": ExportFormat("binary glTF 2.0, for browsers, Blender and game engines", posed=True),
+    "urdf": ExportFormat("a zip of a ROS 2 package of URDF and meshes"),
+    "mjcf": ExportFormat("a zip of a MuJoCo model with actuators, sites, keyframes and its meshes"),
+    "html": ExportFormat(
+        "a page that plays a run, with a time slider; it needs no server", posed=True, moves=True
+    ),
+}
+"""The formats by their names."""
+
+
+def named(trait: Callable[[ExportFormat], bool]) -> list[str]:
+    """Return the names of the formats of which ``trait`` is true."""
+    return [name for name, row in FORMATS.items() if trait(row)]
 
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 export`` to ``parser``."""
-    parser.add_argument("format", choices=tuple(FORMATS), help=_listed())
+    parser.add_argument(
+        "format",
+        choices=tuple(FORMATS),
+        help="; ".join(f"{name}: {row.help}" for name, row in FORMATS.items()),
+    )
     parser.add_argument(
         "--out",
         type=Path,
@@ -71,6 +117,11 @@ def export_format(options: argparse.Namespace) -> int:
     if not row.scene and (options.plain or not options.objects):
         names = " or ".join(named(lambda listed: listed.scene))
         raise InputError(f"{options.format} has no Switch and no objects. Use {names}.")
+    if not row.moves and (options.trajectory is not None or options.run is not None):
+        raise InputError(f"{options.format} has no motion. Use --trajectory or --run with html.")
+    if options.pose and not row.posed:
+        names = ", ".join(named(lambda listed: listed.posed))
+        raise InputError(f"{options.format} has no pose. Use --pose with {names}.")
     if row.moves:
         from katana450.extensions.export.page import write_page
 
@@ -78,10 +129,6 @@ def export_format(options: argparse.Namespace) -> int:
     from katana450.extensions.export.export import export
 
     return export(options)
-
-
-def _listed() -> str:
-    return "; ".join(f"{name}: {row.help}" for name, row in FORMATS.items())
 
 
 def joint_values(text: str) -> tuple[float, ...]:
