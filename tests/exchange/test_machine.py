@@ -19,8 +19,8 @@ from katana450.extensions.export.urdf_package import package_files
 from katana450.extensions.export.vrml.vrml_files import vrml_files, world_of
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
-from tests.exchange.strict_vrml import read_world
 from tests.exchange.trees import tree
+from tests.exchange.vrml_reading import read_world
 from tests.robot.urdf_files import saved
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"

@@ -15,9 +15,6 @@ from katana450.maths.geometry.arrays import FloatArray
 
 resource = pytest.importorskip("resource")
 
-LARGEST = 390_000
-"""Number of triangles of a binary STL file of the maximum size."""
-
 OURS = 1.0
 """[s] Maximum processor time in the process of the server."""
 
@@ -34,13 +31,6 @@ def soup(count: int) -> FloatArray:
     """Return small triangles (count, 3, 3) [mm] in a cube, without common corners."""
     rng = np.random.default_rng(1)
     return rng.uniform(-100.0, 100.0, (count, 1, 3)) + rng.normal(size=(count, 3, 3))
-
-
-def ball(count: int) -> FloatArray:
-    """Return the same with every corner on one sphere, so that all are on the convex hull."""
-    rng = np.random.default_rng(1)
-    corners = rng.normal(size=(count, 1, 3)) + 0.01 * rng.normal(size=(count, 3, 3))
-    return np.asarray(100.0 * corners / np.linalg.norm(corners, axis=2, keepdims=True))
 
 
 def star(count: int) -> bytes:
@@ -65,11 +55,9 @@ def spent() -> tuple[float, float]:
     ("name", "data", "count"),
     [
         ("soup.stl", stl(soup(20_000)), 20_000),
-        pytest.param("soup.stl", stl(soup(LARGEST)), LARGEST, marks=pytest.mark.long),
-        pytest.param("ball.stl", stl(ball(LARGEST)), LARGEST, marks=pytest.mark.long),
         ("star.obj", star(10_000), 9_998),
     ],
-    ids=["soup of 20k", "soup of 390k", "ball of 390k", "polygon of 10k"],
+    ids=["soup of 20k", "polygon of 10k"],
 )
 def test_mesh_is_read_in_the_time_promised(
     monkeypatch: pytest.MonkeyPatch, name: str, data: bytes, count: int

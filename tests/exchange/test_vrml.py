@@ -22,8 +22,8 @@ from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
-from tests.exchange.strict_vrml import Matrix, numbers_of, placed_nodes, read_world
 from tests.exchange.tools import SCREEN, needs, run
+from tests.exchange.vrml_reading import Matrix, numbers_of, placed_nodes, read_world
 
 pytestmark = pytest.mark.long
 

@@ -15,7 +15,7 @@ from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from tests.exchange.joint_rotations import THERE, rotation
-from tests.exchange.strict_vrml import read_world
+from tests.exchange.vrml_reading import read_world
 from tests.gateway.virtual import Rows, VirtualServer
 
 
