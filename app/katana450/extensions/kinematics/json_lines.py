@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import Any, NamedTuple, TextIO, TypeVar
 
+import msgspec
 import numpy as np
 
 from katana450.assembly.robot_files import read_robot
@@ -24,39 +24,27 @@ from katana450.maths.kinematics.arm import family_arm
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.pose import quaternion_misfit
-from katana450.maths.kinematics.pose_units import check_metres, check_radians
+from katana450.maths.kinematics.pose import check_metres, check_radians, quaternion_misfit
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import ToolTarget
+
+Numbers = TypeVar("Numbers")
 
 MAX_SHOWN_CHARACTERS = 40
 """Maximum number of characters of a wrong value that an error message repeats."""
 
 
-def numbers(request: Mapping[str, Any], key: str, depth: int) -> Any:
-    """Return the value of ``key``: lists of JSON numbers, nested ``depth`` deep.
+def numbers(request: Mapping[str, Any], key: str, kind: type[Numbers]) -> Numbers:
+    """Return the value of ``key``, which is of JSON numbers in the shape of ``kind``.
 
-    Raises InputError with the place of a value that is not a number. The caller checks shapes.
+    Raises InputError with the place of a value that is not a number. The caller checks lengths.
     """
     if key not in request:
         raise InputError(f"The key {key!r} is missing.")
-    _check_numbers(request[key], key, depth)
-    return request[key]
-
-
-def _check_numbers(value: Any, place: str, depth: int) -> None:
-    if depth:
-        if not isinstance(value, list):
-            what = "numbers" if depth == 1 else "rows"
-            raise InputError(f"{place} is {shown(value)}; it must be a list of {what}.")
-        for k, entry in enumerate(value):
-            _check_numbers(entry, f"{place}[{k}]", depth - 1)
-        if depth == 2 and len({len(row) for row in value}) > 1:
-            raise InputError(f"The rows of {place} have different lengths; its shape must be 4x4.")
-    elif isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{place} is {shown(value)}; give plain finite numbers.")
-    elif isinstance(value, int) and abs(value) > sys.float_info.max:
-        raise InputError(f"{place} is too large; give plain finite numbers.")
+    try:
+        return msgspec.convert(request[key], kind)
+    except (msgspec.ValidationError, OverflowError) as error:
+        raise InputError(f"{key} is not of plain finite numbers: {error}.") from error
 
 
 def shown(value: Any) -> str:
@@ -101,7 +89,7 @@ def _requested(
 ) -> RequestedPose:
     orientation = [key for key in ("T", *QUATERNIONS, "rpy", "pitch", "roll") if key in request]
     if orientation == ["T"] and "p" not in request:
-        T = numbers(request, "T", 2)
+        T = numbers(request, "T", list[list[float]])
         pose = se3.validated(T, "T")
         misfit = so3.misfit(np.array(T)[:3, :3])
         return RequestedPose(se3.inverse(T_frame_shoulder) @ pose, misfit)
@@ -112,11 +100,10 @@ def _requested(
             "A pose is T, or p with one orientation: wxyz, xyzw, rpy, or both pitch and roll; "
             f"this has {', '.join(sorted(KEYS & set(request)))}."
         )
-    p = finite_array(numbers(request, "p", 1), (3,), "p")
+    p = finite_array(numbers(request, "p", list[float]), (3,), "p")
     if orientation == ["pitch", "roll"]:
-        pitch, roll = (float(numbers(request, key, 0)) for key in orientation)
-        if not (math.isfinite(pitch) and math.isfinite(roll)):
-            raise InputError("pitch and roll must be finite numbers.")
+        angles = [numbers(request, key, float) for key in orientation]
+        pitch, roll = finite_array(angles, (2,), "pitch and roll").tolist()
         check_radians((pitch, roll), "The pose")
         position = (se3.inverse(T_frame_shoulder) @ np.append(p, 1.0))[:3]
         target = ToolTarget(position, pitch, roll)
@@ -136,10 +123,10 @@ def _misses(chain: Chain, T: FloatArray) -> tuple[float, float]:
 def _rotation(request: Mapping[str, Any], key: str) -> tuple[FloatArray, float]:
     """Return the rotation (3, 3) of ``key``, and the deviation of a quaternion from length 1."""
     if key == "rpy":
-        roll, pitch, yaw = finite_array(numbers(request, key, 1), (3,), key).tolist()
+        roll, pitch, yaw = finite_array(numbers(request, key, list[float]), (3,), key).tolist()
         check_radians((roll, pitch, yaw), key)
         return so3.from_rpy(roll, pitch, yaw), 0.0
-    q = finite_array(numbers(request, key, 1), (4,), key)
+    q = finite_array(numbers(request, key, list[float]), (4,), key)
     return so3.from_quaternion(q[list(QUATERNIONS[key])]), quaternion_misfit(q, key)
 
 
@@ -176,7 +163,7 @@ class JsonKinematics:
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Answer ``{"q": [n rad], "tool"}`` with ``{"T": 4x4}`` [m]."""
         chain = self._chain(request, frozenset({"q"}))
-        q = chain.check_q(numbers(request, "q", 1))
+        q = chain.check_q(numbers(request, "q", list[float]))
         return {"T": (self._T_frame_shoulder @ forward(chain, q)).tolist()}
 
     def ik(self, request: Mapping[str, Any]) -> dict[str, Any]:
@@ -197,7 +184,7 @@ class JsonKinematics:
         poses = KEYS if self._is_member else KEYS - {"pitch", "roll"}
         chain = self._chain(request, poses | {"q"})
         kinematics = kinematics_of(chain)
-        hint = chain.check_q(numbers(request, "q", 1)) if "q" in request else None
+        hint = chain.check_q(numbers(request, "q", list[float])) if "q" in request else None
         T, misfit = requested_pose(request, chain, self._T_frame_shoulder)
         solutions = [candidate for candidate in kinematics.inverse(T, hint) if candidate.exact]
         if not solutions:
