@@ -127,14 +127,6 @@ def test_other_arms_reach_the_voxels_of_their_postures(chain: Chain) -> None:
     assert np.linalg.norm(centers - every.middle, axis=1).max() <= every.reach + size
 
 
-@pytest.mark.parametrize("chain", [OPENMANIPULATOR_X, pytest.param(UR5E, marks=pytest.mark.long)])
-def test_map_has_fractions(chain: Chain) -> None:
-    reach_map = reachability_map(chain, STAND, 0.0, 0.3 if chain.n > 4 else 0.08)
-    assert len(reach_map.points) > 10
-    assert ((reach_map.fraction > 0.0) & (reach_map.fraction <= 1.0)).all()
-    assert (reach_map.points[:, 2] >= 0.0).all()
-
-
 def test_map_that_would_take_too_long_is_refused_with_what_to_do() -> None:
     with pytest.raises(InputError, match=r"would take .*arm angle is set by axis 7.*larger voxels"):
         reachability_map(PANDA, STAND, voxel=0.01)
