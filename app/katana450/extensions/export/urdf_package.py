@@ -22,17 +22,12 @@ from katana450.assembly.robot_files import read_urdf
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.files import distinct, zipped
 from katana450.extensions.export.obj_text import LIBRARY, mtl_text, obj_text
-from katana450.resources import URDF_PATH
 
 CONVERTED = (".glb", ".gltf")
 """Suffixes of visual meshes that become OBJ; others are copied unchanged."""
 
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 """Attributes of an inertia."""
-
-OWN_LICENSE, UNSTATED_LICENSE = "MIT", "TODO: License declaration"
-"""Licence of the Katana450's description, and ROS's placeholder for that of another robot."""
-
 
 CMAKE = """\
 cmake_minimum_required(VERSION 3.8)
@@ -50,7 +45,7 @@ MANIFEST = """\
   <version>0.1.0</version>
   <description>{robot}: URDF and meshes</description>
   <maintainer email="todo@todo.todo">TODO: Maintainer</maintainer>
-  <license>{license}</license>
+  <license>TODO: License declaration</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
   <export>
     <build_type>ament_cmake</build_type>
@@ -92,10 +87,9 @@ def packaged(path: Path) -> dict[str, bytes]:
     package = f"{plain.lower()}_description"
     _weigh_frames(root)
     meshes = _with_meshes(root, path.parent, f"package://{package}/")
-    licence = OWN_LICENSE if path.resolve() == URDF_PATH.resolve() else UNSTATED_LICENSE
     folders = "urdf meshes" if meshes else "urdf"
     files = {
-        "package.xml": MANIFEST.format(name=package, robot=escape(robot), license=licence).encode(),
+        "package.xml": MANIFEST.format(name=package, robot=escape(robot)).encode(),
         "CMakeLists.txt": CMAKE.format(name=package, folders=folders).encode(),
         f"urdf/{plain}.urdf": ET.tostring(root, encoding="utf-8", xml_declaration=True),
         **meshes,

@@ -39,11 +39,6 @@ ALIASES: Mapping[str, str] = {
 }
 """Common names, in the form of ``_plain``, and those of the package."""
 
-MAX_SUGGESTIONS = 4
-
-SIMILAR = 0.5
-"""Minimum similarity [1] of a name that is suggested."""
-
 
 @dataclass(frozen=True)
 class ListedRobot:
@@ -98,9 +93,7 @@ def robot_named(name: str) -> ListedRobot:
         problem = f"The gallery has {name!r} as MJCF only, which cannot be read."
     else:
         problem = f"The gallery has no robot {name!r}."
-    names = [
-        by_plain[plain] for plain in get_close_matches(wanted, by_plain, MAX_SUGGESTIONS, SIMILAR)
-    ]
+    names = [by_plain[plain] for plain in get_close_matches(wanted, by_plain, cutoff=0.5)]
     hint = f" Nearest names: {', '.join(names)}." if names else ""
     raise ConfigurationError(f"{problem}{hint} `katana450 arms` lists all.")
 

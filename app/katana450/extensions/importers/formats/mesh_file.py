@@ -45,7 +45,9 @@ def read_mesh(
     Raises InputError with the defect of the file.
     """
     format = Format.of(file)
-    metres = None if unit is None else unit_of(unit)
+    if unit is not None and unit not in UNITS:
+        raise InputError(f"The unit must be one of {', '.join(UNITS)}, not {unit!r}.")
+    metres = None if unit is None else UNITS[unit]
     shape, body = read_shape_guarded(data, format, file, metres, up, main=main)
     sign = next(sign for sign, length in UNITS.items() if length == shape.unit)
     low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
@@ -66,13 +68,6 @@ def read_mesh(
         f"{shape.text} {_counted(shape, body)}",
         shape.scale,
     )
-
-
-def unit_of(sign: str) -> float:
-    """Return the length [m] of the unit ``sign``. Raises InputError for an unknown unit."""
-    if sign not in UNITS:
-        raise InputError(f"The unit must be one of {', '.join(UNITS)}, not {sign!r}.")
-    return UNITS[sign]
 
 
 def _counted(shape: ShapeFile, body: ConvexBody) -> str:

@@ -166,7 +166,9 @@ def read_shape(
         raise InputError(f"{file} is corrupt: its parts are nested too deeply.") from error
     reading = _in_known_unit(reading)
     surface = reading.surface.tidy()
-    left_out = [*reading.left_out, *_degenerate(reading.surface, surface)]
+    left_out = [*reading.left_out]
+    if degenerate := len(reading.surface.faces) - len(surface.faces):
+        left_out.append(f"{degenerate} degenerate triangle{'' if degenerate == 1 else 's'}")
     if not len(surface.faces):
         without = f" It has {_listed(left_out)}." if left_out else ""
         hint = _not_there(companions) or " An object needs a surface: save it with faces."
@@ -261,12 +263,6 @@ def _not_there(companions: Companions) -> str:
         f" It names files that are not there: {_listed(names)}. Add them together with it, as "
         "their folder or as a .zip."
     )
-
-
-def _degenerate(surface: MeshSurface, tidy: MeshSurface) -> list[str]:
-    """Return a note on the triangles of ``surface`` that are not in ``tidy``."""
-    count = len(surface.faces) - len(tidy.faces)
-    return [f"{count} degenerate triangle{'' if count == 1 else 's'}"] if count else []
 
 
 def _in_known_unit(reading: MeshReading) -> MeshReading:

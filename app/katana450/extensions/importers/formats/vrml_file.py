@@ -248,9 +248,6 @@ NO_SURFACE = re.compile(
 )
 """Kinds of nodes that show nothing by themselves, and are not reported as left out."""
 
-PICTURES = "pictures on the surface"
-"""Name of what a texture shows, in messages."""
-
 Shown = Callable[[tuple[str, ...]], MeshSurface | None]
 """A function that returns the surface of the first of several addresses that is there."""
 
@@ -387,7 +384,7 @@ class _Flattening:
         if appearance is None:
             return None
         if part(appearance, "texture") is not None:
-            self._left_out[PICTURES] += 1
+            self._left_out["pictures on the surface"] += 1
         material = part(appearance, "material")
         if material is None or material.kind != "Material":
             return None
