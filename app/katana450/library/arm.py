@@ -44,8 +44,7 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space
 from katana450.maths.kinematics.kinematics import Kinematics
-from katana450.maths.kinematics.pose import pose_matrix
-from katana450.maths.kinematics.pose_units import check_radians
+from katana450.maths.kinematics.pose import check_radians, pose_matrix
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 

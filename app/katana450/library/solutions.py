@@ -16,7 +16,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.inverse_batch import validated_poses
 from katana450.maths.kinematics.kinematics import Kinematics
-from katana450.maths.kinematics.pose_units import check_metres
+from katana450.maths.kinematics.pose import check_metres
 from katana450.maths.kinematics.solution import Solution, Solutions
 
 ROUNDING_ERRORS: Final = 10.0

@@ -19,8 +19,8 @@ from katana450.arm.robot.urdf import Urdf, driver_of
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import screws, se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.arm import exact_member
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.exact_member import exact_member
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
 
 PERPENDICULAR = 0.5

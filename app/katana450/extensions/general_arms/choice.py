@@ -9,10 +9,10 @@ from typing import NamedTuple
 from katana450 import tolerances
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.general_arms.closed_form import ClosedForm
-from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.links import FINE, exact_chain, links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.offset_wrist import OffsetWrist
+from katana450.extensions.general_arms.refinement import FileRounding
 from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain

@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
-from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS, FLOATS, Operations
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.parallel_axes import (
@@ -23,6 +22,7 @@ from katana450.extensions.general_arms.parallel_axes import (
     six_axes,
     why_not_parallel,
 )
+from katana450.extensions.general_arms.refinement import FileRounding
 from katana450.extensions.general_arms.spherical_wrist import (
     Solve,
     crossing_shoulder,

@@ -22,7 +22,7 @@ from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 from katana450.maths.kinematics.kinematics import Kinematics
-from katana450.maths.kinematics.pose_units import check_metres
+from katana450.maths.kinematics.pose import check_metres
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import (
     ANGLE_WORTH_TELLING,

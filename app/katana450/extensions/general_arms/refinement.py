@@ -1,24 +1,35 @@
-"""Newton's method on many postures at once, on the chain as its file describes it.
+"""Refinement of postures on the chain as its file describes it, many at once.
 
-A step solves (J'J + |e|^2 / 100) dq = J'e, where e is the twist from the tool to the pose and J the
-Jacobian, both in the frame of the tool. With this damping the error also falls quadratically at
-postures without a regular Jacobian (Yamashita and Fukushima 2001), where two solutions meet.
+A step of Newton's method solves (J'J + |e|^2 / 100) dq = J'e, where e is the twist from the tool to
+the pose and J the Jacobian, both in the frame of the tool. With this damping the error also falls
+quadratically at postures without a regular Jacobian (Yamashita and Fukushima 2001), where two
+solutions meet.
+
+A closed form solves the exact arm, without the rounding of its file. The tool of the arm in the
+file is beside it by little more than the rounding, which these steps take away. Four axes cannot
+take every pose: their closed form is asked again for the tool point that is moved back by the
+difference, at most CORRECTIONS times, and only while more than DOUBLE is left.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from katana450.caching import cached_property
+from katana450.extensions.general_arms.links import DOUBLE, DHLinks
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.batch import jacobian_batch
+from katana450.maths.kinematics.batch import forward_batch, jacobian_batch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.turns import in_limits_turns
 
 STEPS: Final = 20
 """Maximum number of steps."""
 
-DOUBLE: Final = 1e-14
+ENOUGH: Final = 1e-14
 """[rad], [m] Error that needs no further step."""
 
 GAIN: Final = 0.9
@@ -60,7 +71,7 @@ def refined(
     """
     error, J = _looked(chain, q, T)
     best = Refined(np.array(q), _size(error), np.array(J))
-    active = np.flatnonzero((best.error > DOUBLE) & (best.error <= within))
+    active = np.flatnonzero((best.error > ENOUGH) & (best.error <= within))
     now, error, J = q[active], error[active], J[active]
     previous, size = np.full(len(active), np.inf), best.error[active]
     for _ in range(STEPS):
@@ -78,7 +89,7 @@ def refined(
         places = active[is_better]
         best.q[places], best.error[places] = now[is_better], size[is_better]
         best.J[places] = J[is_better]
-        continues = (size < limit) & (size > DOUBLE)
+        continues = (size < limit) & (size > ENOUGH)
         active, previous, size = active[continues], previous[continues], size[continues]
         now, error, J = now[continues], error[continues], J[continues]
     return best
@@ -99,3 +110,71 @@ def _looked(chain: Chain, q: FloatArray, T: FloatArray) -> tuple[FloatArray, Flo
     error[:, 2] = 0.5 * (left[:, 1, 0] - left[:, 0, 1])
     error[:, 3:] = (inverse @ (T[:, :3, 3:] - reached[:, :3, 3:]))[:, :, 0]
     return error, J
+
+
+CORRECTIONS: Final = 2
+
+BESIDE: Final = 10.0
+"""[1] Ratio of a miss to the bound `FileRounding.offset`, above which the pose is out of reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class FileRounding:
+    """The difference between the arm ``chain`` of a file and the exact ``links`` that solve it."""
+
+    chain: Chain
+    links: DHLinks
+
+    @cached_property
+    def offset(self) -> float:
+        """A bound [m], [rad] on the difference of the tool's poses."""
+        angle, length = self.links.rounding
+        return self.links.n * (angle * max(1.0, self.links.reach) + length)
+
+    @cached_property
+    def is_corrected(self) -> bool:
+        """True if the file rounds more than double precision does."""
+        return max(self.links.rounding) > DOUBLE
+
+    @cached_property
+    def slack(self) -> float:
+        """The error [m], [rad] that a solution for a pose of the exact arm cannot avoid.
+
+        Four axes that are not quite parallel take few poses exactly, and none in two postures. Near
+        axis 1 the turn of axis 1 magnifies the rounding, and a posture may count as not exact.
+        """
+        return BESIDE * self.offset if self.is_corrected and self.chain.n == 4 else 0.0
+
+    def corrected(
+        self,
+        q: FloatArray,
+        T: FloatArray,
+        solve: Callable[[FloatArray], FloatArray] | None = None,
+        locked: tuple[int, ...] = (),
+    ) -> FloatArray:
+        """Return `q` (N, n) [rad] of the exact arm as joint angles of the arm in the file.
+
+        Postures that miss the pose by more than the rounding explains are out of reach, and stay.
+
+        Args:
+            q: the postures.
+            T: (N, 4, 4) their poses.
+            solve: returns the exact arm's postures (N, 4) for other poses, of four axes.
+            locked: joints that stay.
+        """
+        if not self.is_corrected:
+            return q
+        within = BESIDE * self.offset
+        if solve is None:
+            return in_limits_turns(self.chain, refined(self.chain, q, T, within, locked).q)
+        # Four axes hold the tool point of every pose, and the rotation as far as they can.
+        aimed = T
+        for _ in range(CORRECTIONS):
+            missed = T[:, :3, 3] - forward_batch(self.chain, q)[:, :3, 3]
+            near = np.linalg.norm(missed, axis=1) <= within
+            if not (np.abs(missed[near]) > DOUBLE).any():
+                return q
+            aimed = aimed.copy()
+            aimed[:, :3, 3] += missed
+            q = np.where(near[:, None], solve(aimed), q)
+        return q

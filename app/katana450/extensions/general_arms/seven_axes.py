@@ -30,10 +30,10 @@ from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.closed_form import inverses
-from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS, Operations
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.numerical import search_of
+from katana450.extensions.general_arms.refinement import FileRounding
 from katana450.extensions.general_arms.spherical_wrist import (
     Solve,
     arm_angle_link,

@@ -1,6 +1,6 @@
 """Inverse kinematics of many poses at once, in chunks that fit the cache.
 
-It runs the formulas of maths/kinematics/closed_form.py on arrays. The few poses with the
+It runs the formulas of maths/kinematics/solver.py on arrays. The few poses with the
 tool point near axis 1, which need case distinctions, use the scalar `Solver`.
 """
 
@@ -18,8 +18,7 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import CHUNK, chunks, number_array
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.closed_form import Functions, closed_form
-from katana450.maths.kinematics.solver import Solver
+from katana450.maths.kinematics.solver import Functions, Solver, closed_form
 from katana450.maths.kinematics.turns import in_limits_turns
 
 _LAST_ROW: Final = np.array([[0.0], [0.0], [0.0], [1.0]])

@@ -17,8 +17,7 @@ from katana450 import tolerances
 from katana450.maths.kinematics.arm import Five
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.canonical_target import CanonicalTarget, PlaneOrientation
-from katana450.maths.kinematics.limited import LimitedArm
-from katana450.maths.kinematics.planar import Interval, PlanarArm, Posture
+from katana450.maths.kinematics.planar import Interval, LimitedArm, PlanarArm, Posture
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.turns import wrapped
 

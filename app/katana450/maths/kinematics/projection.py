@@ -23,8 +23,8 @@ from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.canonical_target import CanonicalTarget
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.limited import LimitedArm
 from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_posture
+from katana450.maths.kinematics.planar import LimitedArm
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn, wrapped
 

@@ -23,9 +23,8 @@ from katana450.maths.kinematics.arm import Five, FiveAxisArm
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.canonical_target import CanonicalTarget
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.limited import LimitedArm
 from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_posture
-from katana450.maths.kinematics.planar import Interval
+from katana450.maths.kinematics.planar import Interval, LimitedArm
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, measured
 from katana450.maths.kinematics.tool import ToolTarget

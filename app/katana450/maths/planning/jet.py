@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from katana450.maths.kinematics.closed_form import Functions
+from katana450.maths.kinematics.solver import Functions
 
 # A float or an array: the formulas are the same.
 Coefficient = Any

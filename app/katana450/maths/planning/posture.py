@@ -1,6 +1,6 @@
 """Kinematics on jets: the tool point, and the joints of one branch, with their derivatives.
 
-The closed form of maths/kinematics/closed_form.py runs on Taylor series: exact, with derivatives.
+The closed form of maths/kinematics/solver.py runs on Taylor series: exact, with derivatives.
 Lengths in m, angles in rad.
 """
 
@@ -14,7 +14,7 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import FiveAxisArm
 from katana450.maths.kinematics.branch import Branch, Shoulder
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.closed_form import closed_form
+from katana450.maths.kinematics.solver import closed_form
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import JETS, Jet, atan2, sin_cos, sqrt
 

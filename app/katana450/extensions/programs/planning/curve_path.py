@@ -30,8 +30,8 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.limited import LimitedArm
 from katana450.maths.kinematics.nearest_posture import nearest_posture
+from katana450.maths.kinematics.planar import LimitedArm
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import pitch_and_roll
 from katana450.maths.planning.checkpoint import checkpoint
