@@ -13,7 +13,7 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.importers.formats import surface
 from katana450.extensions.importers.formats.shape_file import Format, read_shape
-from tests.exchange.shape_bytes import OBJ
+from tests.exchange.shape_bytes import OBJ, PAINTED, ply
 
 
 def stl(count: int = 1, corners: tuple[float, ...] = (0, 0, 0, 1, 0, 0, 0, 1, 0)) -> bytes:
@@ -47,7 +47,7 @@ def glb(text: bytes, numbers: bytes) -> bytes:
 
 def test_the_unchanged_files_are_read() -> None:
     text = f"solid\n{FACET.format(1)}\nendsolid\n".encode()
-    cases = [(Format.STL, stl()), (Format.STL, text), (Format.GLB, gltf())]
+    cases = [(Format.PLY, ply()), (Format.STL, stl()), (Format.STL, text), (Format.GLB, gltf())]
     for format, data in cases:
         assert len(read_shape(data, format, "a").faces) == 1
 
@@ -93,6 +93,31 @@ INVALID: dict[Format, list[tuple[bytes | str, str]]] = {
         ("v 0 0 0 1 0 0\nf 1 2 3", "vertex 1, counted from 0"),
         ("f 1/2/3 x/1/1", "'x/1/1' is not a corner"),
         ("hello", "line 1: 'hello' is not an OBJ statement"),
+    ],
+    Format.PLY: [
+        (b"", "must begin with 'ply'"),
+        (b"ply\n", "header does not end"),
+        (ply(vertices="x"), "'element vertex x' in its header is invalid"),
+        (ply(vertices=-3), "invalid"),
+        (ply().replace(b"float x", b"quad x"), "'property quad x'"),
+        (ply().replace(b"list uchar", b"list float"), "invalid"),
+        (ply().replace(b"ascii 1.0", b"ascii 2.0"), "invalid"),
+        (ply().replace(b"format ascii 1.0\n", b""), "has no format"),
+        (ply().replace(b"float z", b"float w"), "no vertices with x, y and z"),
+        (ply(faces=0), "has no triangles"),
+        (ply(vertices=2**31), "ends too early"),
+        (ply("3 0 1 3\n"), "vertex 3, counted from 0, but only 3 vertices"),
+        (ply("3 0 1 -1\n"), "vertex -1"),
+        (PAINTED.replace(b"3 0 1 2", b"3 0 1 9"), "vertex 9, counted from 0"),
+        (ply("4 0 1 2\n"), "ends too early|no length"),
+        (ply("-3 0 1 2\n"), "no length"),
+        (ply("3.5 0 1 2\n"), "no length"),
+        (ply("nan 0 1 2\n"), "no length"),
+        (ply("3 0 1 nan\n"), "vertex"),
+        (ply("3 0 1 1e999\n"), "vertex"),
+        (ply("3 0 1 x\n"), "corrupt"),
+        (ply().replace(b"0 1 0\n", b"0 inf 0\n"), "not finite numbers"),
+        (ply().replace(b"ascii", b"binary_little_endian"), "ends too early"),
     ],
     Format.GLB: [
         (b"", "corrupt or not glTF"),
@@ -147,6 +172,7 @@ def test_invalid_shape_is_refused(format: Format, data: bytes | str, said: str) 
         (bytes(80) + struct.pack("<I", 101) + bytes(50 * 101), Format.STL),
         (f"solid\n{FACET.format(1) * 101}\nendsolid".encode(), Format.STL),
         (b"v 0 0 0\n" + b"f" + b" 1" * 103, Format.OBJ),
+        (ply("103" + " 1" * 103 + "\n"), Format.PLY),
         (b"#VRML V2.0 utf8\nShape { geometry Sphere { } }", Format.WRL),
     ],
 )
@@ -164,6 +190,28 @@ def test_statements_of_obj() -> None:
     assert "Left out: lines. It names files that are not there: ../../etc/passwd." in shape.text
     assert shape.colours is not None
     assert shape.colours[0].tolist() == [255, 0, 0, 255]
+
+
+def test_rows_of_ply_may_differ() -> None:
+    """Polygons of several sizes, text and binary, other lists, and colours as numbers 0..1."""
+    header = ply(faces=2, vertices=4).decode().partition("0 0 0")[0]
+    header = header.replace("z\n", "z\nproperty float red\nproperty float green\n")
+    header = header.replace("element face", "property float blue\nelement face")
+    header = header.replace("end_h", "property list uint8 float32 extra\nelement edge 1\n"
+                            "property int a\nend_h")  # fmt: skip
+    square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    text = "".join(f"{x} {y} {z} 1 .5 0\n" for x, y, z in square)
+    text += "4 0 1 2 3 0\n3 2 1 0 2 7 8\n5\n"
+    body = b"".join(struct.pack(">6f", *corner, 1.0, 0.5, 0.0) for corner in square)
+    body += struct.pack(">B4iB", 4, 0, 1, 2, 3, 0) + struct.pack(">B3iB2f", 3, 2, 1, 0, 2, 7, 8)
+    body += struct.pack(">i", 5)
+    binary = header.replace("ascii", "binary_big_endian").encode() + body
+    for data in ((header + text).encode(), binary):
+        shape = read_shape(data, Format.PLY, "a.ply")
+        assert shape.faces.shape == (3, 3)
+        assert shape.colours is not None
+        assert shape.colours[0].tolist() == [255, 128, 0, 255]
+        assert shape.text.endswith("Left out: 1 edge.")
 
 
 def test_colours_and_places_of_gltf() -> None:

@@ -23,7 +23,7 @@ from katana450.extensions.importers.formats.shape_file import (
 from katana450.extensions.importers.guarded_reading import bind, read_shape_guarded
 from tests.exchange.compressed_gltf import draco_glb
 from tests.exchange.mutations import MUTATIONS, check_mutations, looked_at
-from tests.exchange.shape_bytes import OBJ
+from tests.exchange.shape_bytes import OBJ, PAINTED, ply
 from tests.exchange.test_several_files import ARTICULATED
 from tests.exchange.test_vrml_prototypes import JOINT
 
@@ -33,9 +33,13 @@ FOREIGN = Path(__file__).parent / "foreign"
 
 SEEDS = {
     file: (FOREIGN / file).read_bytes()
-    for file in (*("vtk.wrl", "meshlab.stl", "vtk.stl", "meshlab.obj", "assimp.glb", "vtk.gltf"),)
+    for file in (
+        *("vtk.wrl", "castle.wrl", "meshlab.stl", "vtk.stl", "meshlab.obj", "vtk.ply"),
+        *("meshlab.ply", "assimp.glb", "vtk.gltf"),
+    )
 } | {
     "colours.obj": OBJ,
+    "colours.ply": PAINTED,
     "joint.wrl": f"{HEADER}\n{JOINT} Joint {{ children Joint {{ }} }}".encode(),
     "robot.zip": packed("robot.wrl", {name: text.encode() for name, text in ARTICULATED.items()}),
     "draco.glb": draco_glb(),
@@ -52,8 +56,8 @@ def test_mutated_files_are_read_or_refused(seed: str) -> None:
 def test_random_bytes_after_any_header_are_read_or_refused(
     format: Format, data: bytes, count: int
 ) -> None:
-    beginnings = {Format.WRL: "vtk.wrl", Format.STL: "vtk.stl", Format.OBJ: "vtk.obj"}
-    beginning = beginnings.get(format, "assimp.glb")
+    beginnings = {Format.WRL: "castle.wrl", Format.STL: "vtk.stl", Format.OBJ: "vtk.obj"}
+    beginning = beginnings.get(format, "meshlab.ply" if format is Format.PLY else "assimp.glb")
     looked_at((FOREIGN / beginning).read_bytes()[:count] + data, format)
 
 
@@ -72,8 +76,10 @@ def laughs() -> bytes:
     [
         (deeply, Format.WRL),
         (laughs, Format.WRL),
+        (lambda: ply(faces=99_999_999_999), Format.PLY),
+        (lambda: ply("9" * 1_000_000 + " 1" * 1_000_000, faces=0), Format.PLY),
     ],
-    ids=["deep", "laughs"],
+    ids=["deep", "laughs", "faces", "wide"],
 )
 @pytest.mark.usefixtures("limited_time")
 def test_hostile_files_are_refused_in_time(make: Callable[[], bytes], format: Format) -> None:

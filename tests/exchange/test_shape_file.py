@@ -37,7 +37,8 @@ from katana450.extensions.importers.formats.shape_file import (
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.maths.geometry import se3, so3
 from tests.exchange.conftest import GANTRY_POSE, POSES
-from tests.exchange.solids import Numbers, is_closed, sides, volume
+from tests.exchange.shape_bytes import ply
+from tests.exchange.solids import Numbers, is_closed, sides, triangles, volume
 
 FOREIGN = Path(__file__).parent / "foreign"
 
@@ -55,6 +56,9 @@ FLAT, UPRIGHT = [60.0, 40.0, 25.0], [60.0, 25.0, 40.0]
         ("gmsh.obj", FLAT, None),
         ("vtk.obj", FLAT, None),
         ("meshlab.obj", FLAT, None),
+        ("vtk.ply", FLAT, None),
+        ("meshlab.ply", FLAT, (200, 100, 50, 255)),
+        ("assimp.ply", FLAT, None),
         ("vtk.gltf", UPRIGHT, (255, 188, 0, 255)),
         ("assimp.glb", UPRIGHT, (203, 203, 203, 255)),
     ],
@@ -76,21 +80,42 @@ def test_the_bracket_of_other_programs_is_the_bracket(
         assert tuple(shape.colours[0].tolist()) == colour
 
 
+def test_a_whole_world_is_flattened() -> None:
+    """Extrusion, Cylinder, USE and Switch, as written by another program."""
+    shapes = [
+        read_shape((FOREIGN / file).read_bytes(), Format.WRL, file)
+        for file in ("castle.wrl", "bracket.wrl")
+    ]
+    for shape in shapes:
+        # A pin is a prism of 32 sides.
+        pin = 16.0 * 5e-3**2 * np.sin(np.pi / 16.0) * 40e-3
+        assert volume(shape) == pytest.approx(35e-6 + 2.0 * pin, rel=1e-6)
+        assert sides(shape) == [110.0, 115.0, 45.0]
+        assert shape.text.endswith("Left out: Text.")
+        assert shape.colours is not None
+        assert np.unique(shape.colours, axis=0).tolist() == [[255, 128, 0, 191]]
+    castle, ours = (triangles(shape.vertices * 1e3, shape.faces, 3) for shape in shapes)
+    assert castle == ours
+
+
 def written(mesh: trimesh.Trimesh, kind: str) -> bytes:
     """Return the file as trimesh writes it, independently of our code."""
     if kind == "gltf":
         files = export_gltf(trimesh.Scene(mesh), embed_buffers=True)  # type: ignore[no-untyped-call]
         return bytes(files["model.gltf"])
-    data = mesh.export(file_type=kind)
+    kind, _, encoding = kind.partition(" ")
+    data = mesh.export(file_type=kind, **({"encoding": encoding} if encoding else {}))
     return data.encode() if isinstance(data, str) else bytes(data)
 
 
-@pytest.mark.parametrize("kind", ["stl", "stl_ascii", "obj", "glb", "gltf", "3mf"])
+@pytest.mark.parametrize(
+    "kind", ["stl", "stl_ascii", "obj", "ply binary", "ply ascii", "glb", "gltf", "3mf"]
+)
 def test_every_format_gives_the_same_shape(kind: str) -> None:
     turn = se3.from_rotation_translation(so3.exp((0.2, 0.4, 0.6)), (5.0, 0.0, 0.0))
     mesh = trimesh.creation.annulus(10.0, 30.0, 25.0, transform=turn)
     mesh.visual.face_colors = [0, 255, 0, 128]
-    format = Format(kind.removesuffix("_ascii"))
+    format = Format(kind.split(maxsplit=1)[0].removesuffix("_ascii"))
     shape = read_shape(written(mesh, kind), format, "a", 1e-3, Up.Z)
     assert len(shape.faces) == len(mesh.faces)
     assert is_closed(shape)
@@ -219,7 +244,7 @@ def test_the_axis_that_is_up_can_be_given() -> None:
         ("cup.wrl", "cup.wrl", "cup"),
         ("../../etc/passwd.stl", "passwd.stl", "passwd"),
         ("C:\\parts\\arm 2.obj", "arm 2.obj", "arm 2"),
-        ("a\x00\n\x1b[2Jb.obj", "a[2Jb.obj", "a[2Jb"),
+        ("a\x00\n\x1b[2Jb.ply", "a[2Jb.ply", "a[2Jb"),
         ("", "The file", "shape"),
         (".stl", ".stl", "shape"),
         ("x" * 300 + ".stl", "x" * 31 + "…xxxx.stl", "x" * 31 + "…xxxx"),
@@ -267,7 +292,7 @@ def test_formats_follow_from_the_suffix() -> None:
 
 
 def test_a_guarded_reading_is_the_same() -> None:
-    for file, unit, up in (("vtk.wrl", None, Up.Z), ("gmsh.stl", 1e-3, None)):
+    for file, unit, up in (("castle.wrl", None, Up.Z), ("gmsh.stl", 1e-3, None)):
         data = (FOREIGN / file).read_bytes()
         shape = read_shape(data, Format.of(file), f"-{file}", unit, up)
         guarded, body = read_shape_guarded(data, Format.of(file), f"-{file}", unit, up)
@@ -280,17 +305,17 @@ def test_a_guarded_reading_is_the_same() -> None:
 
 
 def test_a_guarded_reading_fails_with_a_message(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(InputError, match=r"hull\.stl is corrupt or not an STL file"):
-        read_shape_guarded(b"not a mesh", Format.STL, "hull.stl")
+    with pytest.raises(InputError, match=r"hull\.ply is not a PLY file"):
+        read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
     with pytest.raises(InputError, match=r"has 20\.0 MB"):
-        read_shape_guarded(bytes(20_000_001), Format.STL, "hull.stl")
+        read_shape_guarded(bytes(20_000_001), Format.PLY, "hull.ply")
     monkeypatch.setattr(guarded_reading, "SECONDS", 0.01)
     with pytest.raises(InputError, match=r"longer than 0.08 s"):
-        read_shape_guarded(b"not a mesh", Format.STL, "hull.stl")
+        read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
     monkeypatch.setattr(guarded_reading, "SECONDS", 5.0)
     monkeypatch.setattr("sys.executable", "false")
     with pytest.raises(InputError, match="needs more than 5 s of processor time or 1024 MiB"):
-        read_shape_guarded(b"not a mesh", Format.STL, "hull.stl")
+        read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
 
 
 @pytest.mark.long
@@ -304,5 +329,5 @@ def test_limit_of_the_reading_time_counts_processor_time(
     slow.chmod(0o700)
     monkeypatch.setattr(guarded_reading, "SECONDS", 1.0)
     monkeypatch.setattr("sys.executable", str(slow))
-    shape, _ = read_shape_guarded(tetrahedron(1.0), Format.OBJ, "a.obj")
-    assert len(shape.faces) == 4
+    shape, _ = read_shape_guarded(ply("3 0 1 2\n"), Format.PLY, "a.ply")
+    assert len(shape.faces) == 1

@@ -37,6 +37,10 @@ SQUARE = "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 1 0
         ("Box { solid FALSE size 1 2 3 }", 6.0, [100, 200, 300]),
         ("Cylinder { radius 2 height 1 }", 4.0 * PRISM, [400, 100, 400]),
         ("Cone { bottomRadius 2 height 3 }", 4.0 * PRISM, [400, 300, 400]),
+        ("Extrusion { }", 4.0, [200, 100, 200]),
+        ("Extrusion { spine [ 1 0 0, 4 0 0 ] }", 12.0, [300, 200, 200]),
+        ("Extrusion { spine [ 0 0 0, 0 1 0, 0 3 0 ] scale [ 1 1, 2 1, 2 1 ] }", 22.0, None),
+        ("Extrusion { spine [ 0 4 0, 0 0 0 ] orientation 0 1 0 .5 }", 16.0, None),
     ],
 )
 def test_solids_have_their_volume(geometry: str, litres: float, size: list[float] | None) -> None:
@@ -51,6 +55,17 @@ def test_a_sphere_is_round() -> None:
     np.testing.assert_allclose(np.linalg.norm(shape.vertices, axis=1), 0.3)
     assert volume(shape) == pytest.approx(4.0 / 3.0 * np.pi * 0.027, rel=0.03)
     assert is_closed(shape)
+
+
+def test_a_bent_extrusion_is_a_mitred_tube() -> None:
+    """A square frame with four mitres has the square's area times its middle line as volume."""
+    shape = shown(
+        "Extrusion { crossSection [ -.1 -.1, -.1 .1, .1 .1, .1 -.1, -.1 -.1 ] beginCap FALSE "
+        "endCap FALSE spine [ 0 0 0, 2 0 0, 2 2 0, 0 2 0, 0 0 0 ] }"
+    )
+    assert is_closed(shape)
+    # The standard's planes bisect the corners but do not widen the section there.
+    assert abs(volume(shape) * 1e3) == pytest.approx(0.04 * 8.0 * np.sqrt(0.5), rel=1e-6)
 
 
 def test_the_sides_of_solids_can_be_left_out() -> None:
@@ -237,17 +252,14 @@ def test_nodes_that_use_others_can_be_deep() -> None:
         ("Wobbler", "expected '{'"),
         ("Shape { geometry Box { size 1 0 0 } }", "has no triangles"),
         ("Shape { geometry Sphere { radius -1 } }", "It has Sphere without a size"),
+        ("Shape { geometry Extrusion { spine [ 0 0 0 ] } }", "too few points"),
         ("Shape { geometry ElevationGrid { height [ 1 ] } }", "It has ElevationGrid"),
-        ("Shape { geometry Extrusion { } }", "It has Extrusion"),
-        (
-            "Shape { geometry IndexedFaceSet { coord Coordinate { point [ 1 2 3 4 ] } } }",
-            "are no rows of 3",
-        ),
         ("Shape { geometry Box { size 1 2 } }", "Box.size has 2 numbers, not 3"),
         ("Shape { geometry Box { size TRUE } }", "Box.size must be numbers"),
         ("Shape { geometry Cone { side 1 } }", "Cone.side must be TRUE or FALSE"),
         ("Transform { children Shape { } rotation 0 0 1 }", "Transform.rotation has 3"),
         (f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 .5 ]'} }}", "must be whole numbers"),
+        ("Shape { geometry Extrusion { spine [ 1 2 3 4 ] } }", "are no rows of 3"),
         (
             f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 4 ]'} }}",
             "a face with vertex 4, counted from 0, but only 4 vertices",
@@ -288,6 +300,7 @@ def test_invalid_vrml_is_refused(data: bytes, said: str) -> None:
     ("text", "note"),
     [
         (f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 2 ] color Color { }'} }}", "colours that"),
+        (f"{BOX} Shape {{ geometry Extrusion {{ spine [ 0 0 0 ] }} }}", "too few points"),
         (f'{BOX} Inline {{ url "..\\parts\\a.wrl" }}', "not there: ../parts/a.wrl"),
         (f"{BOX} Shape {{ geometry IndexedLineSet {{ }} }}", "Left out: IndexedLineSet."),
         (f"{BOX} Box {{ }}", "Left out: Box."),

@@ -93,7 +93,7 @@ def test_libraries_are_loaded_on_use_only(python: Path, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_shapes_are_read_without_extras(python: Path, tmp_path: Path) -> None:
     box = trimesh.creation.box((10.0, 20.0, 30.0))
-    for kind in ("stl", "obj", "glb"):
+    for kind in ("stl", "obj", "ply", "glb"):
         box.export(tmp_path / f"box.{kind}")
     (tmp_path / "draco.glb").write_bytes(draco_glb())
     (tmp_path / "l.3mf").write_bytes(threemf())
@@ -101,7 +101,7 @@ def test_shapes_are_read_without_extras(python: Path, tmp_path: Path) -> None:
     modules = dict(line.split(" ", 1) for line in run(tmp_path, python, "-c", READ).splitlines())
     assert modules.pop("draco.glb").endswith("dracopy networkx")
     assert modules.pop("l.3mf").endswith("dracopy networkx")
-    assert len(modules) == 4
+    assert len(modules) == 5
     assert all(int(faces) >= 2 for faces in modules.values()), modules
 
 

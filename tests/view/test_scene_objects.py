@@ -22,7 +22,6 @@ from katana450.arm.robot.creases import drawn, glb
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.arm.robot.props import load_props
 from katana450.extensions.importers.formats.mesh_file import read_mesh
-from katana450.extensions.importers.formats.shape_file import Up
 from katana450.extensions.objects.handles import ObjectHandles
 from katana450.maths.water.environment import TableTop
 from katana450.server.view.paint import Tint
@@ -44,7 +43,7 @@ def server() -> Iterator[viser.ViserServer]:
 def mesh() -> Mesh:
     painted = trimesh.creation.box((60.0, 40.0, 20.0))
     painted.visual.face_colors = [[220, 30, 30, 255]] * 6 + [[30, 30, 220, 255]] * 6
-    return read_mesh(painted.export(file_type="glb"), "it.glb", "mm", Up.Z)
+    return read_mesh(painted.export(file_type="ply"), "it.ply")
 
 
 def seen(state: State, *objects: SceneObject, near: str = "") -> State:

@@ -89,9 +89,9 @@ def _requested(
 ) -> RequestedPose:
     orientation = [key for key in ("T", *QUATERNIONS, "rpy", "pitch", "roll") if key in request]
     if orientation == ["T"] and "p" not in request:
-        T = numbers(request, "T", list[list[float]])
-        pose = se3.validated(T, "T")
-        misfit = so3.misfit(np.array(T)[:3, :3])
+        rows = numbers(request, "T", list[list[float]])
+        pose = se3.validated(rows, "T")
+        misfit = so3.misfit(np.array(rows)[:3, :3])
         return RequestedPose(se3.inverse(T_frame_shoulder) @ pose, misfit)
     if not orientation and "p" not in request:
         raise InputError("The key 'T' is missing, or 'p' with an orientation.")

@@ -1,4 +1,4 @@
-"""Shapes of other programs as triangles in metres, z up: meshes and worlds in six formats.
+"""Shapes of other programs as triangles in metres, z up: meshes and worlds in seven formats.
 
 Files are untrusted. Readers see no file but those of the same upload, execute nothing, and stop at
 limits of their own. `read_shape_guarded` adds limits of the system, in a disposable subprocess.
@@ -19,6 +19,7 @@ from katana450.errors import InputError, digits_beyond
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, Companions, packed, unpacked
 from katana450.extensions.importers.formats.gltf_file import read_gltf
 from katana450.extensions.importers.formats.obj_file import read_obj
+from katana450.extensions.importers.formats.ply_file import read_ply
 from katana450.extensions.importers.formats.stl_file import read_stl
 from katana450.extensions.importers.formats.surface import MeshReading, MeshSurface
 from katana450.extensions.importers.formats.vrml_file import read_wrl
@@ -60,6 +61,7 @@ class Format(Enum):
     WRL = "wrl"
     STL = "stl"
     OBJ = "obj"
+    PLY = "ply"
     GLB = "glb"
     GLTF = "gltf"
     THREEMF = "3mf"
@@ -246,6 +248,8 @@ def _read(data: bytes, format: Format, file: str, companions: Companions) -> Mes
             return read_stl(data, file)
         case Format.OBJ:
             return read_obj(data, file, companions)
+        case Format.PLY:
+            return read_ply(data, file)
         # The library for this format takes longer to import than a file takes to read.
         case Format.THREEMF:
             from katana450.extensions.importers.formats.threemf_file import read_3mf

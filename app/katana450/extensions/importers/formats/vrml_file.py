@@ -1,8 +1,8 @@
 """VRML worlds of other programs, flattened to one surface.
 
-Source: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.23 IndexedFaceSet, 6.42 Sphere.
-Nodes that are not read are left out and reported. A world shows other worlds of the same upload.
-No script is executed.
+Source: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.18 Extrusion,
+6.23 IndexedFaceSet, 6.42 Sphere. Nodes that are not read are left out and reported. A world shows
+other worlds of the same upload, and no script is executed.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import posixpath
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +24,7 @@ from katana450.extensions.importers.formats.surface import (
     MeshBuilder,
     MeshReading,
     MeshSurface,
+    check_triangles,
     of_polygons,
 )
 from katana450.extensions.importers.formats.vrml_reader import Reader
@@ -103,21 +103,21 @@ def texts(value: Value | None) -> tuple[str, ...]:
     return tuple(item for item in items if isinstance(item, str))
 
 
-def _box(node: Node, name: str) -> MeshSurface:
+def _box(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     half = vector(node, "size", (2.0, 2.0, 2.0)) / 2.0
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     sides = [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 3]
     return of_polygons(signs * half, np.array(sides), np.full(6, 4), name)
 
 
-def _cone(node: Node, name: str) -> MeshSurface:
+def _cone(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     radius, height = number(node, "bottomRadius", 1.0), number(node, "height", 2.0)
     low, tip = (radius, -height / 2.0), (0.0, height / 2.0)
     bottom, side = flag(node, "bottom"), flag(node, "side")
     return _turned([((0.0, low[1]), low)] * bottom + [(low, tip)] * side, name)
 
 
-def _cylinder(node: Node, name: str) -> MeshSurface:
+def _cylinder(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     radius, height = number(node, "radius", 1.0), number(node, "height", 2.0)
     low, high = (radius, -height / 2.0), (radius, height / 2.0)
     segments = [((0.0, low[1]), low)] * flag(node, "bottom")
@@ -126,7 +126,7 @@ def _cylinder(node: Node, name: str) -> MeshSurface:
     return _turned(segments, name)
 
 
-def _sphere(node: Node, name: str) -> MeshSurface:
+def _sphere(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     radius = number(node, "radius", 1.0)
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, ROUND // 2 + 1)
     profile = np.column_stack((np.cos(angles), np.sin(angles))) * radius
@@ -167,9 +167,7 @@ def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     if face_colours is not None:
         corner_colours = np.repeat(face_colours, sizes, axis=0)
     surface = of_polygons(points, corners, sizes, name, corner_colours=corner_colours)
-    if flag(node, "ccw"):
-        return surface
-    return replace(surface, faces=surface.faces[:, ::-1])
+    return _facing(surface, not flag(node, "ccw"))
 
 
 def colour_table(node: Node) -> FloatArray | None:
@@ -198,6 +196,90 @@ def chosen_colours(
     return np.column_stack((table[places], np.ones(len(places))))
 
 
+def _facing(surface: MeshSurface, turned: bool) -> MeshSurface:
+    if not turned:
+        return surface
+    return MeshSurface(surface.vertices, surface.faces[:, ::-1], surface.colours)
+
+
+def _extrusion(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
+    square = (1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
+    section = rows(node, "crossSection", 2, square)
+    spine = rows(node, "spine", 3, (0.0, 0.0, 0.0, 0.0, 1.0, 0.0))
+    scale = rows(node, "scale", 2, (1.0, 1.0))
+    turns = rows(node, "orientation", 4, (0.0, 0.0, 1.0, 0.0))
+    count, length = len(section), len(spine)
+    if count < 2 or length < 2 or not len(scale) or not len(turns):
+        left_out["Extrusion with too few points"] += 1
+        return NOTHING
+    check_triangles(2 * (count - 1) * (length - 1), name)
+    frames = _frames(spine)
+    points = np.empty((length, count, 3))
+    for row in range(length):
+        x, y, z, angle = turns[min(row, len(turns) - 1)]
+        flat = section * scale[min(row, len(scale) - 1)]
+        placed = np.column_stack((flat[:, 0], np.zeros(count), flat[:, 1]))
+        R = frames[row] @ so3.exp(angle * unit(np.array((x, y, z))))
+        points[row] = placed @ R.T + spine[row]
+    first = (np.arange(length - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    quads = np.column_stack((first, first + 1, first + count + 1, first + count))
+    corners, sizes = [quads.ravel()], [np.full(len(first), 4)]
+    # The last corner of a closed section repeats the first.
+    closed = bool((section[0] == section[-1]).all())
+    cap = np.arange(count - closed)
+    for wanted, polygon in (
+        (flag(node, "beginCap"), cap[::-1]),
+        (flag(node, "endCap"), (length - 1) * count + cap),
+    ):
+        if wanted and len(polygon) > 2:
+            corners.append(polygon)
+            sizes.append(np.array([len(polygon)]))
+    surface = of_polygons(
+        points.reshape(-1, 3), np.concatenate(corners), np.concatenate(sizes), name
+    )
+    return _facing(surface, not flag(node, "ccw"))
+
+
+def _frames(spine: FloatArray) -> list[FloatArray]:
+    """Return the section's frame (3, 3) at each point of a spine, as in 6.18.
+
+    y is along the spine and z out of its bend. A point without a bend has the frame of the point
+    before.
+    """
+    closed = bool((spine[0] == spine[-1]).all())
+    following, behind = np.roll(spine, -1, axis=0), np.roll(spine, 1, axis=0)
+    if closed:
+        following[-1], behind[0] = spine[1], spine[-2]
+    else:
+        following[-1], behind[0] = spine[-1], spine[0]
+    along = [unit(row) for row in following - behind]
+    bends = [unit(row) for row in np.cross(following - spine, behind - spine)]
+    if not closed:
+        bends[0], bends[-1] = bends[min(1, len(bends) - 1)], bends[max(len(bends) - 2, 0)]
+    frames: list[FloatArray] = []
+    y = next((row for row in along if row.any()), np.array((0.0, 1.0, 0.0)))
+    z = next((row for row in bends if row.any()), None)
+    if z is None:
+        z = _least_turn(y)[:, 2]
+    for direction, bend in zip(along, bends, strict=True):
+        y = direction if direction.any() else y
+        z = bend if bend.any() else z
+        # A bend in the opposite direction would flip the section.
+        if frames and float(z @ frames[-1][:, 2]) < 0.0:
+            z = -z
+        x = unit(np.cross(y, z))
+        frames.append(np.column_stack((x, y, np.cross(x, y))))
+    return frames
+
+
+def _least_turn(y: FloatArray) -> FloatArray:
+    """Return the smallest rotation (3, 3) that takes the y axis to the unit vector ``y``."""
+    axis = np.cross((0.0, 1.0, 0.0), y)
+    sine, cosine = float(np.linalg.norm(axis)), float(y[1])
+    direction = axis / sine if sine > 0.0 else np.array((0.0, 0.0, 1.0))
+    return so3.exp(direction * float(np.arctan2(sine, cosine)))
+
+
 def unit(v: FloatArray) -> FloatArray:
     """Return ``v`` scaled to length 1; a zero vector stays 0."""
     size = float(np.abs(v).max())
@@ -207,13 +289,15 @@ def unit(v: FloatArray) -> FloatArray:
     return np.asarray(v / np.linalg.norm(v))
 
 
-SOLIDS: dict[str, Callable[[Node, str], MeshSurface]] = {
+SOLIDS: dict[str, Callable[[Node, str, Counter[str]], MeshSurface]] = {
     "Box": _box,
     "Cone": _cone,
     "Cylinder": _cylinder,
     "Sphere": _sphere,
+    "IndexedFaceSet": _face_set,
+    "Extrusion": _extrusion,
 }
-"""The function that builds the surface of a solid, by the kind of its node."""
+"""The function that builds the surface, by the kind of a node."""
 
 
 def surface_of(node: Node, name: str, left_out: Counter[str]) -> MeshSurface | None:
@@ -221,14 +305,12 @@ def surface_of(node: Node, name: str, left_out: Counter[str]) -> MeshSurface | N
 
     ``name`` is the name of the file; ``left_out`` counts what contradicts the rest.
     """
-    if node.kind == "IndexedFaceSet":
-        return _face_set(node, name, left_out)
     if node.kind not in SOLIDS:
         return None
-    if any((rows(node, field) < 0.0).any() for field in LENGTHS[node.kind]):
+    if any((rows(node, field) < 0.0).any() for field in LENGTHS.get(node.kind, ())):
         left_out[f"{node.kind} without a size"] += 1
         return NOTHING
-    return SOLIDS[node.kind](node, name)
+    return SOLIDS[node.kind](node, name, left_out)
 
 
 GZIP = b"\x1f\x8b"
@@ -247,6 +329,9 @@ NO_SURFACE = re.compile(
     "NULL|Viewpoint|Background|Fog|Sound|Script|.*(Info|Light|Sensor|Interpolator)"
 )
 """Kinds of nodes that show nothing by themselves, and are not reported as left out."""
+
+PICTURES = "pictures on the surface"
+"""Name of what a texture shows, in messages."""
 
 Shown = Callable[[tuple[str, ...]], MeshSurface | None]
 """A function that returns the surface of the first of several addresses that is there."""
@@ -384,7 +469,7 @@ class _Flattening:
         if appearance is None:
             return None
         if part(appearance, "texture") is not None:
-            self._left_out["pictures on the surface"] += 1
+            self._left_out[PICTURES] += 1
         material = part(appearance, "material")
         if material is None or material.kind != "Material":
             return None
