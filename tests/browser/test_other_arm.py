@@ -94,6 +94,9 @@ def test_instruments_steps_gizmo_and_branches_are_those_of_the_arm(six: ViserPag
     assert "/target/move" in names
     assert "/target/move/turn" in names
     assert "/target/move/roll" not in names
+    # The panel has its place beside the scene again.
+    show(six, False)
+    six.page.click("#jog-button")
     six.frame.get_by_text("Branches", exact=True).click()
     branches = six.frame.locator("tr[data-branch]")
     branches.first.wait_for()
