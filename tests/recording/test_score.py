@@ -17,7 +17,6 @@ import katana450
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.stop_cause import pressed
 from katana450.cli.main import main
-from katana450.errors import InputError
 from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
@@ -37,7 +36,7 @@ from katana450.extensions.recording.episodes.episode_folder import (
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.messages import EPISODES, nanoseconds
-from katana450.extensions.recording.scoring.score_command import Leaderboard, score_file, shown
+from katana450.extensions.recording.scoring.score_command import is_best, score_file, shown
 from katana450.extensions.recording.scoring.scored import (
     HIGHER_IS_BETTER,
     MEASURES,
@@ -182,27 +181,6 @@ def test_pour_has_the_measures_of_its_report(tmp_path: Path) -> None:
     for name in ("emptied_percent", "spilled_ml", "margin_to_limits_deg"):
         assert result.values[name] == pytest.approx(report[name], rel=0.02, abs=0.01), name
     assert result.values["emptied_ml"] == pytest.approx(199.7, abs=0.3)
-    cup = described().session.begin(described().session.ready, 0.0, 0.0).objects[0].T[:3, 3]
-    np.testing.assert_allclose(result.places["cup"], cup, atol=6e-3)
-
-
-def test_placing_error_is_the_distance_from_the_target(line: Path) -> None:
-    x, y, z = score(line).places["cup"].tolist()
-    targets = {"cup": np.array((x + 0.003, y - 0.004, math.nan)), "basin": np.full(3, math.nan)}
-    assert score(line, targets=targets).values["placing_error_mm"] == pytest.approx(5.0)
-    assert score(line, targets={"cup": np.array((x, y, z + 0.01))}).values[
-        "placing_error_mm"
-    ] == pytest.approx(10.0)
-    # One of two objects is missing: nobody knows how far from its place it is.
-    both = score(line, targets={"stone": np.zeros(3), "cup": np.array((x, y, z))})
-    assert both.values["placing_error_mm"] is None
-    assert both.missing == ("stone",)
-    board = Leaderboard.of((both,))
-    assert "placing_error_mm" in board.measures
-    assert board.notes == [
-        "line.mcap has no object stone, so its placing error is unknown.",
-    ]
-    assert board.json[0]["missing_objects"] == ["stone"]
 
 
 def test_trimmed_episode_is_scored_and_run_again_in_its_range(
@@ -240,23 +218,14 @@ def test_trimmed_episode_is_scored_and_run_again_in_its_range(
         assert shown_part(file, None, None) == (0.0, math.inf)
 
 
-def test_leaderboard_is_sorted_and_marks_the_best(line: Path, stopped: Path) -> None:
-    scores = (score(stopped), score(line))
-    board = Leaderboard.of(scores)
-    assert [row.name for row in board.rows] == ["line.mcap", "stopped.mcap"]
-    assert Leaderboard.of(scores, "tool_path_mm").rows[0].name == "line.mcap"
-    by_sparc = [row.values["sparc"] for row in Leaderboard.of(scores, "sparc").rows]
-    assert by_sparc == sorted(by_sparc, key=lambda value: -(value or 0.0))
-    assert board.is_best(board.rows[0], "stops")
-    assert not board.is_best(board.rows[1], "stops")
-    assert "emptied_ml" not in board.measures
-    alone = Leaderboard.of(scores[:1])
-    assert not any(alone.is_best(scores[0], name) for name in MEASURES)
+def test_best_value_of_a_measure_is_marked(line: Path, stopped: Path) -> None:
+    scores = (score(line), score(stopped))
+    assert is_best(scores, scores[0], "stops")
+    assert not is_best(scores, scores[1], "stops")
+    assert not any(is_best(scores[:1], scores[0], name) for name in MEASURES)
     same = replace(scores[0], values={**scores[0].values, "duration_s": 1e-9 + 1.0})
     near = replace(scores[0], values={**scores[0].values, "duration_s": 1.0})
-    assert not Leaderboard.of((same, near)).is_best(near, "duration_s")
-    with pytest.raises(InputError, match="no measure 'speed'"):
-        Leaderboard.of(scores, "speed")
+    assert not is_best((same, near), near, "duration_s")
     assert set(MEASURES) >= HIGHER_IS_BETTER
 
 
@@ -273,35 +242,19 @@ def test_command_prints_table_and_json(
 ) -> None:
     hostile = tmp_path / "<b>&.mcap"
     hostile.write_bytes(stopped.read_bytes())
-    files = [str(hostile), str(line)]
-    assert main(["score", *files, "--like", str(line)]) == 0
+    assert main(["score", str(hostile), str(line)]) == 0
     printed = capsys.readouterr().out
-    assert re.search(r"1\. line\.mcap +2\. <b>&\.mcap", printed), printed
+    assert re.search(r"line\.mcap +<b>&\.mcap", printed), printed
     assert re.search(r"Stops +0 \* +1\n", printed), printed
-    assert re.search(r"Placing error mm +0 +0\n", printed), printed
-    assert main(["score", str(line), "--json", "--target", "cup=340,-260"]) == 0
+    assert "Emptied" not in printed
+    assert main(["score", str(line), "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)
     assert row["name"] == "line.mcap"
     assert set(MEASURES) <= set(row)
-    assert row["placing_error_mm"] == pytest.approx(0.0, abs=0.01)
-    assert row["places_mm"]["cup"] == pytest.approx([340.0, -260.0, 0.0], abs=0.01)
-
-
-def test_useless_input_is_refused(line: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["score", str(line), "--target", "stone=1,2"]) == 1
-    assert "no object 'stone'. Known objects: basin, cup" in capsys.readouterr().err
     assert main(["score", str(line), "--from", "100"]) == 1
-    # Before any file is simulated, or even found.
-    assert main(["score", str(line.with_name("missing.mcap")), "--sort", "beauty"]) == 1
-    assert "no measure 'beauty'" in capsys.readouterr().err
-    for target in ("cup", "cup=1", "cup=1,x", "=1,2"):
-        with pytest.raises(SystemExit):
-            main(["score", str(line), "--target", target])
 
 
 @pytest.mark.long
 def test_library_scores(line: Path) -> None:
-    run = katana450.open(line)
-    result = run.score(targets={"cup": (0.34, -0.25, math.nan)})
-    assert result.values["placing_error_mm"] == pytest.approx(10.0, abs=0.01)
+    result = katana450.open(line).score()
     assert repr(result).startswith("Scored('line.mcap', duration_s=")

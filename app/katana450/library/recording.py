@@ -8,9 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from katana450.arm.control.commands.commands import Command
 from katana450.caching import cached_property
 from katana450.errors import InputError
@@ -220,28 +217,22 @@ class Recording:
         start: float | None = None,
         end: float | None = None,
         *,
-        targets: Mapping[str, npt.ArrayLike] | None = None,
         urdf: str | os.PathLike[str] | None = None,
     ) -> Scored:
         """Return the measures of this run, as ``katana450 score`` prints them.
 
-        The result has ``values`` by their names, which end with their units, the final ``places``
-        of objects, and the ``tool`` point and its ``speed`` at the times ``t``.
+        The result has ``values`` by their names, which end with their units.
 
         Args:
             start: start of the part [s] after that of the recording; None for that of the episode
                 if the file is one, which may be trimmed, or else of the recording.
             end: its end [s]; None as for ``start``.
-            targets: places (3,) [m] in the base frame where objects should stand at the end, by
-                name, such as the ``places`` of another run; NaN for a number that is free.
             urdf: file of the recorded robot, if it is not the Katana450 of this package.
 
         Raises:
             InputError: the part has no motion or a gap, or its simulation differs.
         """
-        wanted = {name: np.asarray(place, dtype=float) for name, place in (targets or {}).items()}
-        path = None if urdf is None else Path(urdf)
-        return score_file(self.path, start, end, wanted, path)
+        return score_file(self.path, start, end, None if urdf is None else Path(urdf))
 
 
 def open(path: str | os.PathLike[str]) -> Recording:

@@ -111,26 +111,6 @@ def add_score_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 score`` to ``parser``."""
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="recordings")
     _add_part_options(parser, episode=True)
-    parser.add_argument(
-        "--target",
-        action="append",
-        default=[],
-        type=_target,
-        metavar="OBJECT=X,Y[,Z]",
-        help="place at which an object should stand at the end, in mm in the base frame",
-    )
-    parser.add_argument(
-        "--like",
-        type=Path,
-        metavar="FILE",
-        help="a recording at whose end the objects stand where they should",
-    )
-    parser.add_argument(
-        "--sort",
-        default="duration_s",
-        metavar="MEASURE",
-        help="measure by which several recordings are sorted (default: %(default)s)",
-    )
     parser.add_argument("--json", action="store_true", help="print the measures as JSON")
     _add_urdf_option(parser)
 
@@ -220,15 +200,3 @@ def _outcomes(text: str) -> tuple[str, ...]:
             f"expected some of {', '.join(OUTCOMES)}, separated by commas, not {text!r}"
         )
     return outcomes
-
-
-def _target(text: str) -> tuple[str, tuple[float, float, float]]:
-    name, _, place = text.partition("=")
-    try:
-        numbers = [1e-3 * float(coordinate) for coordinate in place.split(",")]
-    except ValueError:
-        numbers = []
-    if not name or len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
-        raise argparse.ArgumentTypeError(f"expected OBJECT=X,Y or OBJECT=X,Y,Z, not {text!r}")
-    x, y, z = (*numbers, math.nan)[:3]
-    return name, (x, y, z)

@@ -27,7 +27,7 @@ from katana450.extensions.recording.files.simulation import check_whole, recorde
 from katana450.extensions.recording.files.table import columns
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.contact import Contact
-from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 
 RATE = 100.0
@@ -90,9 +90,6 @@ def dimensionless_jerk(velocity: FloatArray) -> float:
     return float((jerk * jerk).sum()) / RATE * duration**5 / length**2
 
 
-PLACING: Final = "placing_error_mm"
-"""Name of the measure that needs targets."""
-
 MEASURES: Final = (
     "duration_s",
     "tool_path_mm",
@@ -109,7 +106,6 @@ MEASURES: Final = (
     "emptied_percent",
     "spilled_ml",
     "cup_peak_jerk_m_s3",
-    PLACING,
     "stops",
     "contacts",
 )
@@ -129,9 +125,6 @@ CLEARANCE_PERIOD = 0.05
 SAME_SETPOINT = 1e-6
 """[rad] Largest difference of the simulation from the recorded setpoints."""
 
-Places = Mapping[str, FloatArray]
-"""Places (3,) [m] of objects in the base frame, by their names; NaN for a number that is free."""
-
 
 @dataclass(frozen=True, eq=False)
 class Scored:
@@ -140,15 +133,10 @@ class Scored:
     Attributes:
         name: name of the recording.
         values: each of MEASURES by its name; None if it does not apply.
-        places: final place (3,) of each object in the base frame [m].
-        missing: names of the objects that have a target and are not in the recording. The placing
-            error is then unknown.
     """
 
     name: str
     values: Mapping[str, float | None]
-    places: Places
-    missing: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         known = {name: value for name, value in self.values.items() if value is not None}
@@ -161,7 +149,6 @@ def scored(
     robot: DescribedRobot,
     start: float = 0.0,
     end: float = math.inf,
-    targets: Places | None = None,
     *,
     name: str = "recording",
 ) -> Scored:
@@ -174,7 +161,6 @@ def scored(
         robot: the recorded robot and its rules.
         start: start of the part [s].
         end: end of the part [s].
-        targets: places at which objects should stand at the end.
         name: name of the recording.
 
     Raises:
@@ -195,7 +181,6 @@ def scored(
     tool = _tool_points(robot, run)
     velocity = np.gradient(tool, 1.0 / RATE, axis=0)
     speed = np.linalg.norm(velocity, axis=1)
-    places = _places(session, states[-1])
     arm = session.require_arm()
     joints = motion_measures(
         arm,
@@ -212,7 +197,6 @@ def scored(
         "sparc": sparc(speed) if moved else None,
         "nearest_clearance_mm": _clearance(session, run),
         **joints,
-        PLACING: _placing_error(places, targets or {}),
         "stops": float(_begins([state.stopped is not None for state in states])),
         "contacts": float(_begins([_waits_before_contact(state) for state in states])),
     }
@@ -224,8 +208,7 @@ def scored(
     water = states[-1].poured
     if water is not None and water.water.total:
         values |= water_measures(water.water, water.course)
-    missing = tuple(sorted((targets or {}).keys() - places.keys()))
-    return Scored(name, values, places, missing)
+    return Scored(name, values)
 
 
 def _check_same(file: RecordingFile, states: Sequence[State], first: float, last: float) -> None:
@@ -294,24 +277,6 @@ def _clearance(session: Session, states: Sequence[State]) -> float | None:
 def _of_held(state: State, contact: Contact) -> bool:
     """Return whether an object takes part that fingers may touch, as when it is grasped."""
     return any(body.can_be_held and body.name in contact.parts for body in state.objects)
-
-
-def _places(session: Session, state: State) -> dict[str, FloatArray]:
-    pose = session.environment.pose
-    return {body.name: frozen(pose(body, state.x_setpoint)[:3, 3]) for body in state.objects}
-
-
-def _placing_error(places: Places, targets: Places) -> float | None:
-    """Return the maximum distance [mm] of an object from its target.
-
-    Returns None without a target, and if an object with a target is missing.
-    """
-    if not targets or targets.keys() - places.keys():
-        return None
-    return 1e3 * max(
-        float(np.linalg.norm(np.nan_to_num(places[name] - target)))
-        for name, target in targets.items()
-    )
 
 
 def _waits_before_contact(state: State) -> bool:
