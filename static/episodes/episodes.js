@@ -3,7 +3,7 @@ import { element, styled, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 
 /** @typedef {Page.Outcome} Outcome */
-/** @typedef {"success" | "failure" | "discard" | "rerecord" | "undo"} Act */
+/** @typedef {"success" | "failure" | "discard" | "rerecord"} Act */
 /**
  * An episode of the list, and the answer to a request.
  * @typedef {object} Episode
@@ -14,7 +14,7 @@ import { button, html } from "../instruments/shape.js";
 /** @type {Record<Outcome, string>} */
 const OUTCOMES = { success: "Success", failure: "Failure", unjudged: "Not judged", unfinished: "Unfinished" };
 /** Name and key of each button below REC. @type {Record<Act, [label: string, letter: string]>} */
-const ACTS = { success: ["Success", "Y"], failure: ["Failure", "N"], discard: ["Discard", "X"], rerecord: ["Re-record", "B"], undo: ["Undo", "U"] };
+const ACTS = { success: ["Success", "Y"], failure: ["Failure", "N"], discard: ["Discard", "X"], rerecord: ["Re-record", "B"] };
 const MEGA = 1e6; // bytes
 const entriesOfActs = /** @type {[Act, [string, string]][]} */ (Object.entries(ACTS));
 const opener = element("episodes-button", HTMLButtonElement);
@@ -87,7 +87,7 @@ export class Episodes {
     this.#may = role !== "viewer";
     opener.hidden = !state;
     if (!state) return;
-    const { running, saving, last, undo, problem } = state;
+    const { running, saving, last, problem } = state;
     opener.classList.toggle("on", Boolean(running));
     const parts = running ? [`REC ${clock(running.seconds)}`, size(running.bytes)] : ["REC", ""];
     [...opener.children].forEach((span, i) => write(span, parts[i]));
@@ -97,8 +97,7 @@ export class Episodes {
     this.#rec.replaceChildren(saving ? "Saving…" : running ? `End episode ${running.number}, ${clock(running.seconds)}` : "Start an episode", key("T"));
     this.#rec.disabled = Boolean(saving);
     this.#rec.classList.toggle("on", Boolean(running));
-    const asks = running || saving || last;
-    for (const act of this.#acts.querySelectorAll("button")) act.hidden = act.dataset.act === "undo" ? !undo : !asks;
+    for (const act of this.#acts.querySelectorAll("button")) act.hidden = !(running || saving || last);
     const left = running?.left != null ? ` It ends by itself in ${clock(running.left)}: an episode has at most an hour.` : "";
     const one = last && `Episode ${last.number}, ${extent(last.seconds, last.missing_ticks)}: `;
     const now = saving ? "Saving…" : running ? `Recording episode ${running.number}, by ${running.by}.${left}` : last && last.outcome === "unjudged" ? `${one}how did it go?` : last ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode is kept.";
@@ -126,10 +125,10 @@ export class Episodes {
     if (!this.#state || !this.#may || event.ctrlKey || event.metaKey || event.altKey) return false;
     // The letter on the key, which is elsewhere on other keyboards.
     const letter = /^[a-z]$/i.test(event.key) ? event.key.toUpperCase() : event.code.slice(3);
-    const { running, saving, last, undo } = this.#state;
+    const { running, saving, last } = this.#state;
     const judged = last && !["unjudged", "unfinished"].includes(last.outcome);
     const act = letter === "T" ? "rec" : entriesOfActs.find(([, [, own]]) => own === letter)?.[0];
-    const asks = act === "undo" ? undo : running || saving || (last && (!judged || !this.sheet.hidden));
+    const asks = running || saving || (last && (!judged || !this.sheet.hidden));
     if (!act || (act !== "rec" && !asks)) return false;
     if (event.type === "keydown" && !event.repeat) this.#act(act);
     return true;
@@ -137,28 +136,24 @@ export class Episodes {
 
   /** @param {Act | "rec"} act */
   async #act(act) {
-    const { running = null, saving = null, last: before = null, undo = null } = this.#state ?? {};
+    const { running = null, saving = null, last: before = null } = this.#state ?? {};
     if (act === "rec" && saving) return;
     // The episode that is seen: another person may have ended it, or judged another one.
     const seen = { number: running?.number ?? saving ?? before?.number };
     const request =
       act === "rec" ? (running ? { do: "stop", ...seen } : { do: "start", task: this.#task.value })
       : isOutcome(act) ? { do: "judge", outcome: act, ...seen }
-      : act === "undo" ? { do: act, number: undo?.number }
       : { do: act, ...seen };
     const done = await this.#ask(request);
     if (!done) return;
     // The next key may come before the next state.
     const { number, outcome, start, end, missing_ticks } = done;
     const last = { number, outcome, seconds: end - start, missing_ticks };
-    const judged = isOutcome(act) && (running || saving || before?.outcome !== act);
-    const undoable = act === "undo" ? null : judged || act === "discard" || act === "rerecord" ? { number } : undo;
-    if (this.#state) this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }), undo: undoable };
+    if (this.#state) this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }) };
     const name = `Episode ${number}`;
     if (act === "rec" && running) this.toast(by(`${name} has ended${missing_ticks ? `: ${extent(end - start, missing_ticks)}` : ""}.`, " Y: success, N: failure, X: discard"));
-    else if (isOutcome(act)) this.toast(by(`${name}: ${act}.`, " U: undo"));
-    else if (act === "discard") this.toast(by(`${name} is discarded.`, " U: undo"));
-    else if (act === "undo") this.toast(end ? `${name} is as before.` : "Both attempts are kept.");
+    else if (isOutcome(act)) this.toast(`${name}: ${act}.`);
+    else if (act === "discard") this.toast(`${name} is discarded. The list restores it.`);
   }
 
   // Send `request`; return the episode, or null after a refusal, which is shown.

@@ -94,9 +94,6 @@ def test_whole_flow_by_keyboard_alone(
     assert outcomes(server) == ["unjudged"]
     keys.press("y")
     toast(page, "Episode 1: success")
-    keys.press("u")
-    toast(page, "as before")
-    assert outcomes(server) == ["unjudged"]
     keys.press("n")
     page.wait_until(lambda: outcomes(server) == ["failure"], "the failure")
     keys.press("b")
@@ -106,11 +103,10 @@ def test_whole_flow_by_keyboard_alone(
     page.wait_until(lambda: outcomes(server) == ["success"], "the success")
     keys.press("x")
     toast(page, "Episode 2 is discarded")
-    keys.press("u")
-    page.wait_until(lambda: outcomes(server) == ["success"], "the episode again")
+    page.wait_until(lambda: outcomes(server) == [], "the episode gone")
     # STOP is the same as ever.
     assert bar(page, "mode").startswith("On target")
-    (path,) = (recorded / "episodes").glob("*.mcap")
+    (path,) = (recorded / "episodes" / "discarded").glob("*2.mcap")
     assert path.name == "episode-0002.mcap"
     (episode,) = katana450.open(path).episodes
     assert episode.task == "Pour the water"
@@ -137,8 +133,6 @@ def test_whole_flow_on_a_phone(open_page: OpenPage, server: AppServer, artefacts
     sheet.locator("summary").first.tap()
     page.keep(artefacts / "episodes-phone-list.png")
     assert_fits(page)
-    tap(page, "Undo")
-    page.wait_until(lambda: outcomes(server) == ["unjudged"], "the undo")
     note = sheet.get_by_label("Note")
     note.tap()
     note.fill("a little spilled")

@@ -64,7 +64,7 @@ declare namespace Page {
   type Outcome = "success" | "failure" | "unjudged" | "unfinished";
   interface EpisodesState {
     revision: number; running: { number: number; seconds: number; bytes: number; left: number | null; by: string } | null;
-    saving: number | null; count: number; task: string; last: LastEpisode | null; undo: { number: number } | null;
+    saving: number | null; count: number; task: string; last: LastEpisode | null;
     problem: string; notice: string;
   }
 

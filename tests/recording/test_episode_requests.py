@@ -49,49 +49,9 @@ def test_request_for_an_episode_that_has_ended_reaches_no_other(bench: Bench) ->
     # Only the one that was seen is judged, while the other one continues.
     bench.ask(do="judge", number=1, outcome="success")
     assert bench.keeper.status()["running"]["number"] == 2
-    with pytest.raises(InputError, match="that of episode 1, not 2"):
-        bench.ask(do="undo", number=2)
     bench.ask(do="stop", number=2)
     assert bench.folder.find(1).episode.outcome is EpisodeOutcome.SUCCESS
     assert bench.folder.find(2).episode.outcome is EpisodeOutcome.UNJUDGED
-
-
-def test_undo_is_offered_only_if_there_is_something_to_undo(bench: Bench) -> None:
-    def offered() -> object:
-        return bench.keeper.status()["undo"]
-
-    attempt(bench, outcome="success")
-    assert offered() is None
-    bench.ask(do="judge", outcome="success")
-    assert offered() is None
-    bench.ask(do="judge", outcome="failure")
-    assert offered() == {"number": 1}
-    bench.ask(do="discard")
-    assert offered() == {"number": 1}
-    # The list has undone it already.
-    bench.ask(do="restore", number=1)
-    assert offered() is None
-
-
-def test_episode_is_discarded_only_when_the_one_that_replaces_it_is_kept(bench: Bench) -> None:
-    attempt(bench)
-    assert bench.ask(do="rerecord", number=1)["number"] == 2
-    assert numbers(bench) == ([1], [])
-    bench.move(40)
-    # A worse one.
-    bench.ask(do="discard")
-    assert numbers(bench) == ([1], [2])
-    assert bench.ask(do="rerecord")["number"] == 3
-    bench.move(40)
-    bench.ask(do="judge", outcome="success")
-    assert numbers(bench) == ([3], [1, 2])
-    # A crash keeps both.
-    assert bench.ask(do="rerecord")["number"] == 4
-    bench.move(40)
-    bench.ring.sync()
-    bench.keeper = bench.made()
-    assert numbers(bench) == ([3, 4], [1, 2])
-    assert bench.folder.find(4).episode.outcome is EpisodeOutcome.UNFINISHED
 
 
 def test_judgements_are_in_the_last_minutes_too(bench: Bench) -> None:

@@ -31,7 +31,6 @@ from katana450.extensions.recording.episodes.episode_folder import (
     with_episode,
     write_episode,
 )
-from katana450.extensions.recording.episodes.keeper import UNDO_SECONDS
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import session_for, verify_recording
@@ -154,7 +153,7 @@ def test_wrong_description_is_refused(text: str, why: str) -> None:
         episode_of(text)
 
 
-def test_episode_is_begun_judged_and_undone(bench: Bench) -> None:
+def test_episode_is_begun_and_judged(bench: Bench) -> None:
     bench.move(50)
     answer = bench.ask(do="start", task="pour")
     assert answer["number"] == 1
@@ -174,13 +173,8 @@ def test_episode_is_begun_judged_and_undone(bench: Bench) -> None:
     assert len(katana450.open(entry.path).t) > 50
     assert bench.ring.held is None
     assert not bench.folder.markers()
-    bench.ask(do="undo")
-    assert bench.folder.find(1).episode.outcome is EpisodeOutcome.UNJUDGED
     bench.ask(do="judge", outcome="failure")
-    bench.t += UNDO_SECONDS
-    assert bench.keeper.status()["undo"] is None
-    with pytest.raises(InputError, match="nothing to undo"):
-        bench.ask(do="undo")
+    assert bench.folder.find(1).episode.outcome is EpisodeOutcome.FAILURE
 
 
 def test_discarded_episodes_come_back_and_numbers_are_not_used_twice(bench: Bench) -> None:
@@ -191,23 +185,17 @@ def test_discarded_episodes_come_back_and_numbers_are_not_used_twice(bench: Benc
     bench.ask(do="discard")
     assert bench.keeper.status()["count"] == 1
     assert [entry.episode.number for entry in bench.folder.discarded()] == [2]
-    bench.ask(do="undo")
-    assert bench.keeper.status()["count"] == 2
-    # Again: the last one is discarded, and the next has its task.
+    # Again: the last one, or the one that runs, is discarded, and the next has its task.
     again = bench.ask(do="rerecord")
     assert (again["number"], again["task"]) == (3, "pour")
     bench.move(40)
-    again = bench.ask(do="rerecord")
-    assert again["number"] == 4
+    assert bench.ask(do="rerecord")["number"] == 4
     bench.move(40)
-    # The one before comes back, while its next attempt runs.
-    bench.ask(do="undo")
-    bench.ask(do="discard", number=3)
     bench.ask(do="stop", outcome="success")
-    assert [entry.episode.number for entry in bench.folder.kept()] == [1, 4]
-    assert [entry.episode.number for entry in bench.folder.discarded()] == [2, 3]
+    assert [entry.episode.number for entry in bench.folder.kept()] == [4]
+    assert [entry.episode.number for entry in bench.folder.discarded()] == [1, 2, 3]
     bench.ask(do="restore", number=2)
-    assert bench.keeper.status()["count"] == 3
+    assert bench.keeper.status()["count"] == 2
     with pytest.raises(InputError, match="no discarded episode 2"):
         bench.ask(do="restore", number=2)
     with pytest.raises(InputError, match="no episode 9"):

@@ -87,18 +87,8 @@ class RestoreEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="restore"):
     number: Number
 
 
-class UndoEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="undo"):
-    """Undo the last judgement, discard or re-record, up to 10 s after it.
-
-    Attributes:
-        number: The episode; what was done to another one since is not undone. None for any.
-    """
-
-    number: Number | None = None
-
-
 class RerecordEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="rerecord"):
-    """Begin an episode again. When the new one is kept, the old one is discarded.
+    """Discard an episode, and begin another one with the same task.
 
     Attributes:
         number: The old episode; None for the one that runs, or else the last one. One that runs is
@@ -142,7 +132,6 @@ AnyEpisodeRequest = (
     | JudgeEpisode
     | DiscardEpisode
     | RestoreEpisode
-    | UndoEpisode
     | RerecordEpisode
     | DescribeEpisode
     | TrimEpisode

@@ -194,14 +194,12 @@ class EpisodeMarker(msgspec.Struct, frozen=True):
         ring: folder of the ring with its ticks.
         first: name of the first file of the ring that belongs to it; empty for any.
         run: text that names the run of the server, see ``utc_offset_ns`` of a recording.
-        replaces: numbers of the episodes that are discarded when it is kept.
     """
 
     episode: Episode
     ring: Path
     first: str
     run: str
-    replaces: tuple[int, ...] = ()
 
 
 def episode_files(folder: Path) -> list[Path]:

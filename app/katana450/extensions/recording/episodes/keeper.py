@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,30 +41,9 @@ from katana450.server.api.episode_requests import (
     StartEpisode,
     StopEpisode,
     TrimEpisode,
-    UndoEpisode,
 )
 
-UNDO_SECONDS = 10.0
-"""[s] Time in which the last judgement can be undone."""
-
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class UndoableJudgement:
-    """The last judgement, discard or re-record.
-
-    Attributes:
-        number: the episode.
-        before: its outcome before; None if it was discarded, or is the one that runs.
-        until: time [s] from which it cannot be undone any more.
-        replaced: for a re-record, the episodes that were to be replaced before it; else None.
-    """
-
-    number: int
-    before: EpisodeOutcome | None
-    until: float
-    replaced: tuple[int, ...] | None = None
 
 
 class EpisodeKeeper:
@@ -95,11 +73,9 @@ class EpisodeKeeper:
         self._clock = clock
         self._requests = threading.Lock()
         self._changed = threading.Condition()
-        self._undoable: UndoableJudgement | None = None
         self._notice = ""
         self._revision = 0
-        callbacks = self._note_change, self._move
-        self._running = RunningEpisode(folder, ring, ring_folder, run, *callbacks)
+        self._running = RunningEpisode(folder, ring, ring_folder, run, self._note_change)
         interrupted, last = folder.markers(), folder.last()
         newest = interrupted[-1] if interrupted else last
         self._task = "" if newest is None else newest.episode.task
@@ -133,12 +109,11 @@ class EpisodeKeeper:
 
     @property
     def active(self) -> bool:
-        """True if the state changes by itself, because an episode runs or can be undone."""
-        return self._running.episode is not None or self._undo() is not None
+        """True if the state changes by itself, because an episode runs."""
+        return self._running.episode is not None
 
     def status(self) -> dict[str, Any]:
         """Return the state as JSON values."""
-        undo = self._undo()
         return {
             "revision": self._revision,
             "running": self._running.status(self._clock()),
@@ -146,7 +121,6 @@ class EpisodeKeeper:
             "count": self._folder.count(),
             "task": self._task,
             "last": self._last_kept(),
-            "undo": None if undo is None else {"number": undo.number},
             "problem": self._without_paths(self._running.problem),
             "notice": self._without_paths(self._notice),
         }
@@ -172,10 +146,6 @@ class EpisodeKeeper:
         ):
             text = text.replace(f"{folder}{os.sep}", "").replace(str(folder), name)
         return text
-
-    def _undo(self) -> UndoableJudgement | None:
-        undo = self._undoable
-        return undo if undo is not None and self._clock() < undo.until else None
 
     def _note_change(self, notice: str = "") -> None:
         with self._changed:
@@ -210,10 +180,7 @@ class EpisodeKeeper:
             case DiscardEpisode(number=number):
                 episode = self._discard(number, t)
             case RestoreEpisode(number=number):
-                self._undoable = None
                 episode = self._move(number, discard=False)
-            case UndoEpisode(number=number):
-                episode = self._undone(number)
             case RerecordEpisode(number=number):
                 episode = self._rerecord(number, by, t)
             case DescribeEpisode(number=number, task=task, note=note):
@@ -250,8 +217,6 @@ class EpisodeKeeper:
 
     def _stop(self, outcome: EpisodeOutcome, t: float, number: int | None = None) -> Episode:
         self._check_running(number)
-        if self._undoable is not None and self._undoable.replaced is not None:
-            self._undoable = None
         return self._running.stop(outcome, t)
 
     def _check_running(self, number: int | None) -> None:
@@ -276,72 +241,23 @@ class EpisodeKeeper:
         return last.episode
 
     def _judge(self, number: int | None, outcome: EpisodeOutcome, t: float) -> Episode:
-        before = EpisodeOutcome.UNJUDGED
         if self._running.runs(number):
             # With its outcome, which is kept if it can only be saved later.
-            episode = self._stop(outcome, t)
-        else:
-            judged = self._last(number)
-            episode = self._change(judged.number, "judged", outcome=outcome)
-            before = judged.outcome
-        if outcome is not before:
-            self._make_undoable(episode.number, before)
-        return episode
+            return self._stop(outcome, t)
+        return self._change(self._last(number).number, "judged", outcome=outcome)
 
     def _discard(self, number: int | None, t: float) -> Episode:
         if self._running.runs(number):
-            # What it was to replace stays.
-            self._running.set_replaces(())
             number = self._stop(EpisodeOutcome.UNJUDGED, t).number
-        episode = self._move(self._last(number).number)
-        self._make_undoable(episode.number, None)
-        return episode
+        return self._move(self._last(number).number)
 
     def _rerecord(self, number: int | None, by: EpisodeGiver, t: float) -> Episode:
-        """Begin an episode that replaces the one that runs, or else the last one, when it is kept.
-
-        Until then nothing is discarded.
-        """
-        replaced: tuple[int, ...] = ()
+        """Discard the episode that runs, or else the last one, and begin another with its task."""
         if self._running.runs(None):
             self._check_running(number)
-            replaced = self._running.replaces
-            self._running.set_replaces(())
-            before = self._stop(EpisodeOutcome.UNJUDGED, t)
-        else:
-            before = self._last(number)
-        episode = self._start(before.task, by, self._clock())
-        self._running.set_replaces((*replaced, before.number))
-        self._make_undoable(episode.number, None, replaced)
-        return episode
-
-    def _make_undoable(
-        self,
-        number: int,
-        before: EpisodeOutcome | None,
-        replaced: tuple[int, ...] | None = None,
-    ) -> None:
-        until = self._clock() + UNDO_SECONDS
-        self._undoable = UndoableJudgement(number, before, until, replaced)
-
-    def _undone(self, number: int | None) -> Episode:
-        undo = self._undo()
-        if undo is None:
-            raise InputError(
-                f"There is nothing to undo: only the last judgement, for {UNDO_SECONDS:g} s. The "
-                "list of episodes changes every one."
-            )
-        if number not in (None, undo.number):
-            raise InputError(
-                f"The last judgement is that of episode {undo.number}, not {number}. The list of "
-                "episodes changes every one."
-            )
-        self._undoable = None
-        if undo.replaced is not None:
-            return self._running.set_replaces(undo.replaced)
-        if undo.before is None:
-            return self._move(undo.number, discard=False)
-        return self._change(undo.number, "judged", outcome=undo.before)
+            number = self._stop(EpisodeOutcome.UNJUDGED, t).number
+        before = self._move(self._last(number).number)
+        return self._start(before.task, by, self._clock())
 
     def _trim(self, number: int, start: float, end: float) -> Episode:
         whole = self._folder.find(number)

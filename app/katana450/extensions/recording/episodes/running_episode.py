@@ -170,16 +170,14 @@ class RunningEpisode:
         ring_folder: Path,
         run: str,
         changed: Callable[[], None],
-        discard: Callable[[int], object],
     ) -> None:
         """Begin without an episode.
 
-        ``changed`` is called before one is saved, and ``discard`` afterwards with the number of
-        each one that it replaces. The others are those of ``EpisodeKeeper``.
+        ``changed`` is called before one is saved. The others are those of ``EpisodeKeeper``.
         """
         # It may be finished by a program with another working directory.
         self._folder, self._ring, self._ring_folder = folder, ring, ring_folder.absolute()
-        self._run, self._changed, self._discard = run, changed, discard
+        self._run, self._changed = run, changed
         self._marker: EpisodeMarker | None = None
         self._size_before = 0
         self._retry_at: float | None = None
@@ -230,22 +228,6 @@ class RunningEpisode:
         if episode.end is not None:
             raise InputError(self._problem)
         return True
-
-    @property
-    def replaces(self) -> tuple[int, ...]:
-        """Numbers of the episodes that are discarded when this one is kept."""
-        return () if self._marker is None else self._marker.replaces
-
-    def set_replaces(self, numbers: tuple[int, ...]) -> Episode:
-        """Let the episode replace those of ``numbers`` when it is kept; return it.
-
-        Raises InputError if that cannot be written.
-        """
-        assert self._marker is not None
-        marker = replace(self._marker, replaces=numbers)
-        self._folder.mark(marker)
-        self._marker = marker
-        return marker.episode
 
     def start(self, episode: Episode) -> None:
         """Begin ``episode``. Raises InputError if there is another, or nothing can be written."""
@@ -316,11 +298,6 @@ class RunningEpisode:
             log.error("%s", self._problem)
             raise InputError(f"{self._problem} It is tried again every few seconds.") from error
         self._forget(number)
-        if episode.outcome is not EpisodeOutcome.UNFINISHED:
-            for replaced in marker.replaces:
-                # Somebody may have discarded it meanwhile.
-                with suppress(InputError):
-                    self._discard(replaced)
         return episode
 
     @property
