@@ -82,7 +82,7 @@ check-js: $(js_ok)            ## types and style of the page in static/
 	$(node) $(javascript)/node_modules/eslint/bin/eslint.js --config $(javascript)/eslint.config.js static
 
 mcap-js: $(dev_ok) $(js_ok)   ## read a recording by @mcap/core, the reader for JavaScript
-	KATANA450_LONG=1 $(pytest) tests/recording/test_damaged_recordings.py -k javascript -n 0
+	KATANA450_LONG=1 $(pytest) tests/recording/test_readers_of_others.py -k javascript -n 0
 
 dist: $(dev_ok)               ## build wheel and source distribution in build/dist, and check them
 	rm -rf build/dist

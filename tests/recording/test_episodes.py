@@ -26,6 +26,7 @@ from katana450.extensions.recording.episodes.episode import (
     message_of,
 )
 from katana450.extensions.recording.episodes.episode_folder import (
+    EpisodeFolder,
     episode_files,
     only_episode,
     with_episode,
@@ -347,7 +348,7 @@ def test_crash_leaves_the_running_episode_unfinished(bench: Bench) -> None:
     assert bench.folder.find(2).episode.outcome is EpisodeOutcome.FAILURE
 
 
-def test_folder_is_listed_and_recovered_by_the_command(
+def test_folder_is_listed_by_the_command_and_used_by_one_server(
     bench: Bench, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = str(bench.folder.folder)
@@ -357,19 +358,14 @@ def test_folder_is_listed_and_recovered_by_the_command(
     bench.ask(do="start", task="stir")
     bench.move(100)
     bench.ring.sync()
-    assert main(["record", "recover", folder]) == 1
-    assert "Another server uses" in capsys.readouterr().err
+    with pytest.raises(InputError, match="Another server uses"):
+        EpisodeFolder(bench.folder.folder).claim()
     assert main(["record", "list", folder]) == 0
     assert "episode 1, success: pour\nEpisode 2 runs" in capsys.readouterr().out
     # As after a crash of the server.
-    bench.folder.release()
-    assert main(["record", "recover", folder, "--out", "all.mcap"]) == 1
-    assert "which has no --out" in capsys.readouterr().err
-    assert main(["record", "recover", folder]) == 0
-    assert "Episode 2 was interrupted and is kept as unfinished" in capsys.readouterr().out
+    bench.keeper = bench.made()
     assert main(["record", "list", folder]) == 0
     assert "episode 2, unfinished: stir" in capsys.readouterr().out
-    bench.keeper = bench.made()
 
 
 def test_folder_lists_files_only(bench: Bench, recorded: Path) -> None:

@@ -7,32 +7,28 @@ from pathlib import Path
 
 import pytest
 
-from katana450.cli.main import main
 from katana450.extensions.recording.episodes.episode_folder import EpisodeMarker
 from tests.recording.episode_bench import Bench
 
 
 def test_interrupted_episode_waits_until_its_ring_is_found(
-    bench: Bench, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder, away = bench.folder.folder, bench.ring_folder.with_name("away")
+    away = bench.ring_folder.with_name("away")
     monkeypatch.chdir(bench.ring_folder.parent)
     bench.ring_folder = Path("ring")
     bench.keeper = bench.made()
     bench.ask(do="start", task="stir")
     bench.move(100)
     bench.ring.sync()
-    bench.folder.release()
     monkeypatch.chdir("/")
     away.with_name("ring").rename(away)
-    assert main(["record", "recover", str(folder)]) == 0
-    assert "There is no folder" in capsys.readouterr().out
+    assert "There is no folder" in bench.made().status()["notice"]
     assert len(bench.folder.markers()) == 1
     away.rename(away.with_name("ring"))
-    assert main(["record", "recover", str(folder)]) == 0
-    assert "is kept as unfinished" in capsys.readouterr().out
-    assert not bench.folder.markers()
     bench.keeper = bench.made()
+    assert "is kept as unfinished" in bench.keeper.status()["notice"]
+    assert not bench.folder.markers()
 
 
 def test_end_of_an_interrupted_episode_keeps_the_files_of_a_new_one(

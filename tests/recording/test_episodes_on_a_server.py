@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -22,7 +21,6 @@ from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.gateway.client import ask, enter
 from tests.recording.test_recorder import POSTURES, RECORDER
-from tests.waiting import until
 
 
 @pytest.fixture
@@ -82,7 +80,7 @@ def test_client_records_episodes(
     client.describe(1, note="half a cup")
     client.trim(1, 0.1, 0.9)
     client.judge("failure")
-    client.undo()
+    client.judge("success")
     (episode,) = client.list()
     assert (episode.outcome, episode.note) == ("success", "half a cup")
     assert episode.end - episode.start == pytest.approx(0.8)
@@ -107,14 +105,12 @@ def test_client_records_episodes(
     server.stop()
     assert main(["record", "list", str(folder)]) == 0
     assert "episode 1, success: pour" in capsys.readouterr().out
-    assert main(["record", "recover", str(folder)]) == 0
-    assert "No episode was interrupted" in capsys.readouterr().out
 
 
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
-def test_killed_server_leaves_an_episode_that_is_recovered(
-    command: tuple[str, ...], folder: Path, capsys: pytest.CaptureFixture[str]
+def test_next_server_finishes_the_episode_of_a_killed_one(
+    command: tuple[str, ...], folder: Path
 ) -> None:
     with AppServer(command) as server:
         started(server, "cut off")
@@ -126,10 +122,9 @@ def test_killed_server_leaves_an_episode_that_is_recovered(
                 os.kill(process, signal.SIGKILL)
         with suppress(ServerError):
             server.stop()
-    capsys.readouterr()
-    until(partial(_recovered, folder))
-    assert "Episode 1 was interrupted and is kept as unfinished" in capsys.readouterr().out
-    (entry,) = EpisodeFolder(folder).kept()
+    with AppServer(command) as server:
+        started(server, "next")
+        (entry,) = EpisodeFolder(folder).kept()
     assert entry.episode.task == "cut off"
     assert entry.episode.length > 1.0
 
@@ -142,7 +137,3 @@ def test_server_that_ends_finishes_its_episode(server: AppServer, folder: Path) 
     (entry,) = EpisodeFolder(folder).kept()
     assert entry.episode.outcome is EpisodeOutcome.UNFINISHED
     assert entry.episode.length > 1.0
-
-
-def _recovered(folder: Path) -> bool:
-    return main(["record", "recover", str(folder)]) == 0

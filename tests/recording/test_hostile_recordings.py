@@ -14,20 +14,16 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import (
     Channel,
     Chunk,
-    ChunkIndex,
     DataEnd,
-    Footer,
     Header,
     Message,
+    MessageIndex,
     Metadata,
-    MetadataIndex,
-    Schema,
 )
 
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.files.trimming import trim
@@ -69,12 +65,6 @@ def test_mutations_raise_only_input_errors(path: Path, tmp_path: Path) -> None:
             used(target)
         except InputError:
             refused += 1
-        try:
-            if recover(target, tmp_path / "out.mcap") is not None:
-                with RecordingFile.open(tmp_path / "out.mcap"):
-                    pass
-        except InputError:
-            refused += 1
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert refused > 0.5 * MUTATIONS
@@ -92,25 +82,18 @@ MAGIC = b"\x89MCAP0\r\n"
 
 
 def bomb(chunk: Chunk) -> bytes:
-    """Return a recording with ``chunk``, and an index that is right."""
-    start = packed(Header("katana450", "x"), Metadata("katana450", {"format": "1"}))
-    offset = len(MAGIC) + len(start)
-    content = packed(chunk, DataEnd(0))
-    summary = packed(
-        Schema(1, b"{}", "jsonschema", "katana450.State"),
-        Channel(1, "/state", "json", {}, 1),
-        ChunkIndex(len(packed(chunk)), offset, "zstd", 10, 2**62, 0, {1: offset}, 0, 10),
-        MetadataIndex(len(MAGIC) + len(packed(Header("katana450", "x"))), 30, "katana450"),
-    )
-    footer = packed(Footer(offset + len(content), 0, 0))
-    return MAGIC + start + content + summary + footer + MAGIC
+    """Return a recording with ``chunk`` and its index."""
+    metadata = Metadata("katana450", {"format": "1"})
+    index = MessageIndex(1, [(0, 0)])
+    return MAGIC + packed(Header("katana450", "x"), metadata, chunk, index, DataEnd(0))
 
 
 def chunk(data: bytes, size: int) -> Chunk:
     return Chunk("zstd", data, 2**62, 0, 0, size)
 
 
-TEN = chunk(zstandard.compress(b"x" * 10), 10)
+CHANNEL = packed(Channel(1, "/state", "json", {}, 1))
+TEN = chunk(zstandard.compress(CHANNEL), len(CHANNEL))
 
 
 @pytest.mark.parametrize("stated", [10, 2_000_000_000, 2**60])
@@ -119,10 +102,10 @@ def test_bomb_is_not_unpacked(tmp_path: Path, stated: int) -> None:
     (tmp_path / "bomb.mcap").write_bytes(bomb(chunk(zeros, stated)))
     tracemalloc.start()
     with (
-        RecordingFile.open(tmp_path / "bomb.mcap") as file,
-        pytest.raises(InputError, match="size of a chunk"),
+        pytest.raises(InputError, match=r"size of a chunk|a chunk has \d+ bytes"),
+        RecordingFile.open(tmp_path / "bomb.mcap"),
     ):
-        columns(file)
+        pass
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 10e6
@@ -150,7 +133,7 @@ def test_length_beyond_the_file_reserves_no_memory(path: Path, tmp_path: Path) -
     [
         (b"", "is not a recording, or is damaged: it ends 8 bytes too soon"),
         (b"PK\x03\x04" * 100, "is not a recording: it does not begin as MCAP files do"),
-        (MAGIC + bytes(100), "has no valid end, as after a crash"),
+        (MAGIC + bytes(100), "is not a recording, or is damaged"),
         (bomb(TEN).replace(b"katana450", b"kathana45"), "but no recording"),
     ],
 )
@@ -169,23 +152,11 @@ def test_command_says_what_is_wrong(
     assert "cannot be read: No such file or directory." in capsys.readouterr().err
 
 
-def test_file_without_any_recording_is_not_recovered(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "file.mcap"
-    path.write_bytes(b"no recording")
-    assert main(["record", "recover", str(path)]) == 1
-    assert (
-        "cannot be recovered: its beginning is not that of a recording" in capsys.readouterr().err
-    )
-    assert path.read_bytes() == b"no recording"
-
-
 def test_message_with_a_wrong_value_names_its_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     message = Message(1, 0, b'{"t": 1, "setpoint": ["x"]}', 0, 0)
-    content = packed(message)
+    content = CHANNEL + packed(message)
     (tmp_path / "x.mcap").write_bytes(bomb(chunk(zstandard.compress(content), len(content))))
     with (
         RecordingFile.open(tmp_path / "x.mcap") as file,

@@ -30,13 +30,17 @@ from katana450.arm.control.state.stop_cause import pressed
 from katana450.arm.runtime.tick import TickRecord
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
-from katana450.extensions.recording.files.recording_file import checked_size, utc_offset_of
+from katana450.extensions.recording.files import recording_file
+from katana450.extensions.recording.files.recording_file import (
+    RecordingFile,
+    checked_size,
+    utc_offset_ns,
+)
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live.ring import Ring
-from katana450.extensions.recording.playback import chunks, opened_run
+from katana450.extensions.recording.playback import opened_run
 from katana450.extensions.recording.playback import run as run_module
-from katana450.extensions.recording.playback.chunks import ChunkIndex
 from katana450.extensions.recording.playback.routes import PlaybackRoutes, difference
 from katana450.extensions.recording.playback.rows import still_flying
 from katana450.extensions.recording.playback.run import (
@@ -96,7 +100,7 @@ def test_file_that_grows_is_read_as_far_as_it_is_written(
     path = tmp_path / "growing.mcap"
     ends = []
     run = PlaybackRun(lambda: [path])
-    begins = [chunk.offset for chunk in ChunkIndex(recorded[0]).chunks]
+    begins = [chunk.offset for chunk in RecordingFile(recorded[0]).chunks]
     for size in (begins[1], begins[1] + 9, begins[-1] - 1, len(content)):
         path.write_bytes(content[:size])
         run.update()
@@ -145,7 +149,7 @@ def test_files_that_would_fill_the_memory_are_refused(
     with pytest.raises(ValueError, match="the size of a chunk is wrong"):
         checked_size(Chunk("", bytes(100), 0, 0, 0, 10))
     with monkeypatch.context() as patched:
-        patched.setattr(chunks, "MAX_RECORDS", 3)
+        patched.setattr(recording_file, "MAX_RECORDS", 3)
         with pytest.raises(InputError, match="more than 3 records"):
             read(recorded[0])
     run = read(recorded[0])
@@ -180,7 +184,7 @@ def test_file_that_its_process_cannot_decode_is_refused(
     ("text", "seconds"), [("-1500000000", -1.5), ("--5", 0.0), ("\u00b2", 0.0), ("x", 0.0)]
 )
 def test_wrong_offset_counts_as_none(text: str, seconds: float) -> None:
-    assert utc_offset_of({"utc_offset_ns": text}) == seconds
+    assert utc_offset_ns({"utc_offset_ns": text}) == 1e9 * seconds
 
 
 class StopAndPlan:

@@ -23,8 +23,8 @@ import katana450
 from katana450.arm.control.lease import Role
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
-from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.trimming import keep
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live import record_end, ring
 from katana450.extensions.recording.live.job_process import JobReport
@@ -167,7 +167,7 @@ def test_killed_recorder_loses_a_second_and_the_arm_nothing(
             client.joints(POSTURES[1 - kill % 2])
             until(partial(_has_newer, folder, before))
             broken = recordings_in(folder)[-2]
-            # Made whole by the next process. What was synced a second before is there.
+            # It has no end. What was synced a second before is there.
             assert verified(broken) > 0
             assert moved - tick_times(broken)[-1] <= MAX_LOSS
     server.stop()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -42,7 +43,6 @@ from katana450.extensions.recording.messages import (
 )
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
-from katana450.platform_support import claim_file
 from katana450.resources import URDF_PATH
 from tests.recording.recorded import (
     described,
@@ -258,21 +258,60 @@ def test_csv_is_a_motion_that_export_plays(
     assert records[0].t + 0.4 < table["t"][0]
 
 
-def test_file_that_is_being_written_is_not_replaced(
+def test_file_without_an_end_is_read_as_far_as_it_was_written(
     records: list[TickRecord], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "running.mcap"
     with path.open("wb") as opened:
-        claim_file(opened.fileno())
         writer = RecordingWriter(opened, header())
-        for record in records[:20]:
-            writer.put(record)
-        writer.flush()
-        assert main(["record", "recover", str(path)]) == 1
-        assert "is being written by a running program" in capsys.readouterr().err
-        writer.close()
+        for number in range(3):
+            for record in records[20 * number : 20 * number + 20]:
+                writer.put(record)
+            writer.flush()
+    content = path.read_bytes()
     with RecordingFile.open(path) as file:
-        assert file.counts()[COMMANDS] == 20
+        begins = [chunk.offset for chunk in file.chunks]
+        last = file.messages_of(file.chunks[-1], COMMANDS)
+    (length,) = struct.unpack_from("<Q", content, begins[-1] + 1)
+    # Whole; without the index of its last chunk; with a part of that, or with zeros in its place.
+    for data, ticks in (
+        (content, 60),
+        (content[: begins[-1] + 9 + length], 60),
+        (content[: begins[-1] + 100], 40),
+        (content[: begins[-1] + 40] + bytes(len(content) - begins[-1] - 40), 40),
+        (content + bytes(1000), 60),
+    ):
+        path.write_bytes(data)
+        with RecordingFile.open(path) as file:
+            assert file.counts()[COMMANDS] == ticks
+            assert verify_recording(file, described().session).ticks == ticks - 1
+    assert last[-1].number == 60
+    assert main(["record", "info", str(path)]) == 0
+    assert "It has no end" in capsys.readouterr().out
+    assert main(["record", "trim", str(path), "--out", str(tmp_path / "whole.mcap")]) == 0
+    with (tmp_path / "whole.mcap").open("rb") as stream:
+        assert make_reader(stream, validate_crcs=True).get_summary() is not None
+
+
+def test_parts_beside_a_damaged_chunk_are_read(records: list[TickRecord], tmp_path: Path) -> None:
+    path = tmp_path / "damaged.mcap"
+    with path.open("wb") as opened:
+        writer = RecordingWriter(opened, header())
+        for number in range(3):
+            for record in records[20 * number : 20 * number + 20]:
+                writer.put(record)
+            writer.flush()
+        writer.close()
+    content = bytearray(path.read_bytes())
+    with RecordingFile.open(path) as file:
+        place, start = file.chunks[2].offset + 200, file.chunks[2].start
+    content[place] ^= 255
+    path.write_bytes(content)
+    with RecordingFile.open(path) as file, pytest.raises(InputError, match="is damaged"):
+        verify_recording(file, described().session)
+    trim([path], tmp_path / "part.mcap", -math.inf, start - 0.005)
+    with RecordingFile.open(tmp_path / "part.mcap") as file:
+        assert verify_recording(file, described().session).ticks == 39
 
 
 def test_recording_of_another_robot_is_refused(

@@ -236,10 +236,10 @@ class Recording:
 
 
 def open(path: str | os.PathLike[str]) -> Recording:
-    """Return the recording at ``path``. Raises InputError if it is none, or has no end.
+    """Return the recording at ``path``. Raises InputError if it is none.
 
-    A recording is an MCAP file that `katana450 serve` writes. After a crash, repair it with
-    ``katana450 record recover``.
+    A recording is an MCAP file that `katana450 serve` writes, also one without an end, as after a
+    crash.
 
     Args:
         path: the file.

@@ -48,7 +48,7 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     acts = parser.add_subparsers(
         dest="act",
         required=True,
-        metavar="keep | list | info | recover | verify | again | trim | export",
+        metavar="keep | list | info | verify | again | trim | export",
     )
     keep = acts.add_parser(
         "keep", help="keep what a server has just recorded, whether it still runs or not"
@@ -71,13 +71,6 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     listed.add_argument("folder", type=Path, nargs="?", default=Path(), metavar="FOLDER")
     info = acts.add_parser("info", help="describe a recording")
     info.add_argument("file", type=Path, metavar="FILE")
-    recover = acts.add_parser(
-        "recover", help="repair a recording, or a folder of episodes, after a crash"
-    )
-    recover.add_argument("path", type=Path, metavar="FILE | FOLDER")
-    recover.add_argument(
-        "--out", type=Path, metavar="FILE", help="new file (default: replace the broken one)"
-    )
     verify = acts.add_parser(
         "verify", help="simulate the recorded commands again and compare every tick"
     )

@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 
 import msgspec
 from mcap.opcode import Opcode
+from mcap.reader import SeekingReader
 from mcap.records import Message as McapMessage
 from mcap.summary import Summary
 from msgspec.structs import replace
@@ -30,6 +31,8 @@ from katana450.extensions.recording.episodes.episode import (
     message_of,
 )
 from katana450.extensions.recording.files.recording_file import (
+    MAX_RECORD_BYTES,
+    BoundedStream,
     Message,
     RecordingFile,
     reading,
@@ -122,11 +125,11 @@ def append_message(path: Path, message: Message) -> None:
 
     Raises InputError if the file is not a whole recording or cannot be written.
     """
-    with RecordingFile.open(path) as recording:
-        summary = recording.summary
-    if summary.statistics is None:
-        raise InputError(f"{path} has no index, so it is not a whole recording.")
     with reading(path), path.open("rb") as file:
+        stream: Any = BoundedStream(file)
+        summary = SeekingReader(stream, record_size_limit=MAX_RECORD_BYTES).get_summary()
+        if summary is None or summary.statistics is None:
+            raise InputError(f"{path} has no index, so it is not a whole recording.")
         data = _data(path, file)
     write_files({path: lambda out: _write(out, data, summary, message)})
 

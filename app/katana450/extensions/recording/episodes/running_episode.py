@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import logging
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from katana450.extensions.recording.episodes.episode_folder import (
     EpisodeMarker,
     write_episode,
 )
-from katana450.extensions.recording.files.keeping import whole_copy
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import gaps_in
 from katana450.extensions.recording.folders import recordings_in
@@ -43,17 +41,17 @@ def cut_out(folder: EpisodeFolder, marker: EpisodeMarker, kind: str) -> Episode:
         raise InputError(
             f"There is no folder {marker.ring}, in which its motion was recorded. Bring it back."
         )
-    with _sources(marker) as sources:
-        start, end, states = _extent(sources)
-        if not states:
-            raise NothingRecordedError(NOTHING)
-        episode = marker.episode
-        if episode.end is None:
-            outcome = EpisodeOutcome.UNFINISHED
-            episode = replace(episode, end=max(end, episode.start), outcome=outcome)
-        episode = replace(episode, start=min(max(episode.start, start), episode.end or end))
-        episode = replace(episode, missing_ticks=_missing_ticks(sources, episode))
-        write_episode(sources, folder.path(episode.number), episode, kind)
+    sources = _sources(marker)
+    start, end, states = _extent(sources)
+    if not states:
+        raise NothingRecordedError(NOTHING)
+    episode = marker.episode
+    if episode.end is None:
+        outcome = EpisodeOutcome.UNFINISHED
+        episode = replace(episode, end=max(end, episode.start), outcome=outcome)
+    episode = replace(episode, start=min(max(episode.start, start), episode.end or end))
+    episode = replace(episode, missing_ticks=_missing_ticks(sources, episode))
+    write_episode(sources, folder.path(episode.number), episode, kind)
     return episode
 
 
@@ -84,37 +82,16 @@ def finish_interrupted(folder: EpisodeFolder, markers: Sequence[EpisodeMarker]) 
     return sentences
 
 
-@contextmanager
-def _sources(marker: EpisodeMarker) -> Iterator[list[Path]]:
-    """Yield whole files of the ring with the ticks of the episode of ``marker``."""
-    with tempfile.TemporaryDirectory(prefix="katana450-") as temporary:
-        sources = []
-        for written in recordings_in(marker.ring):
-            path = written
-            if path.name < marker.first:
-                continue
-            run = _run_of(path)
-            if run is None:
-                # The file that is being written, or one that a crash left open.
-                copy = whole_copy(path, Path(temporary) / path.name)
-                if copy is None:
-                    continue
-                path, run = copy, _run_of(copy)
-            if run == marker.run:
+def _sources(marker: EpisodeMarker) -> list[Path]:
+    """Return the files of the ring with ticks of the episode of ``marker``."""
+    sources = []
+    for path in recordings_in(marker.ring):
+        # One without a beginning, as after a crash, has nothing of it.
+        with suppress(InputError), RecordingFile.open(path) as file:
+            run = file.metadata.get("utc_offset_ns", "")
+            if path.name >= marker.first and run == marker.run and file.chunks:
                 sources.append(path)
-        yield sources
-
-
-def _run_of(path: Path) -> str | None:
-    """Return the run of the server that wrote ``path``; empty without any message.
-
-    Returns None if the file has no valid end.
-    """
-    try:
-        with RecordingFile.open(path) as file:
-            return file.metadata.get("utc_offset_ns", "") if any(file.counts().values()) else ""
-    except InputError:
-        return None
+    return sources
 
 
 def _missing_ticks(sources: list[Path], episode: Episode) -> int:

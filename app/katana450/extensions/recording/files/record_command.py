@@ -1,4 +1,4 @@
-"""``katana450 record``: list, describe, repair, verify, cut and export recordings and episodes."""
+"""``katana450 record``: list, describe, verify, cut and export recordings and episodes."""
 
 from __future__ import annotations
 
@@ -18,19 +18,16 @@ from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.export_command import check_options, export
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episodes_in
-from katana450.extensions.recording.episodes.running_episode import finish_interrupted
 from katana450.extensions.recording.files.header import (
     DISTANCES,
     OF_PROCESS,
     differences,
     fingerprint,
 )
-from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.simulation import simulates_apart, verified
-from katana450.extensions.recording.files.trimming import Trimmed, trim
+from katana450.extensions.recording.files.trimming import Trimmed, keep, trim
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.ticks import Verification
 
@@ -60,8 +57,6 @@ def record(options: Namespace) -> int:
             return _list(options.folder)
         case "info":
             return _info(options.file)
-        case "recover":
-            return _recover(options.path, options.out)
         case "verify":
             return _verify(options.file, options.urdf, as_json=options.json)
         case "trim":
@@ -86,7 +81,7 @@ def _list(folder: Path) -> int:
         except InputError as error:
             print(printable(f"{path}  {error}"), file=sys.stderr)
     for marker in EpisodeFolder(folder).markers():
-        print(f"Episode {marker.episode.number} runs, or was interrupted.")
+        print(f"Episode {marker.episode.number} runs, or waits for the next start of its server.")
     return 0
 
 
@@ -103,6 +98,10 @@ def _info(path: Path) -> int:
     with RecordingFile.open(path) as file:
         print(f"{path}: {file.end - file.start:.1f} s from {_began(file)}, {file.size / MB:.1f} MB")
         print(f"Times of its messages: {file.start:.3f} to {file.end:.3f} s")
+        if not file.ended:
+            print(
+                "It has no end, as after a crash or while it is written; `record trim` makes one."
+            )
         for topic, count in file.counts().items():
             print(printable(f"  {topic}: {count} messages"))
         for attachment in file.attachments():
@@ -113,32 +112,6 @@ def _info(path: Path) -> int:
             print(printable(f"  script {run.name} from {run.start:.3f}{end} s: {run.script}"))
         for name, value in sorted(file.metadata.items()):
             print(printable(f"  {name}: {value}"))
-    return 0
-
-
-def _recover(path: Path, out: Path | None) -> int:
-    if path.is_dir():
-        if out is not None:
-            raise InputError(f"{path} is a folder of episodes, which has no --out.")
-        return _recover_episodes(path)
-    recovered = recover(path, out or path)
-    if recovered is None:
-        print(f"{path} is whole: nothing was changed.")
-    else:
-        print(printable(f"{out or path}: {recovered}."))
-    return 0
-
-
-def _recover_episodes(path: Path) -> int:
-    """Finish interrupted episodes in the folder ``path``, which no server may use."""
-    folder = EpisodeFolder(path)
-    folder.claim()
-    try:
-        sentences = finish_interrupted(folder, folder.markers())
-    finally:
-        folder.release()
-    for sentence in sentences or ["No episode was interrupted."]:
-        print(printable(sentence))
     return 0
 
 

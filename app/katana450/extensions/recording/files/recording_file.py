@@ -10,18 +10,18 @@ import math
 import re
 import struct
 import zlib
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Final, NamedTuple, Self
 
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import InvalidMagic, McapError
-from mcap.reader import SeekingReader
-from mcap.records import Channel, Chunk, ChunkIndex
+from mcap.records import Attachment as McapAttachment
+from mcap.records import Channel, Chunk, Metadata
 from mcap.stream_reader import StreamReader
-from mcap.summary import Summary
 
 from katana450.errors import InputError
 from katana450.extensions.recording.files.header import METADATA, Attachment, RecordedSettings
@@ -43,7 +43,22 @@ HEAD: Final = struct.Struct("<BQ")
 MESSAGE: Final = struct.Struct("<HIQQ")
 """Start of a message: channel, number of the tick, log time and publish time [ns]."""
 
-CHANNEL_CODE, MESSAGE_CODE = 0x04, 0x05
+TIMES: Final = struct.Struct("<QQQ")
+"""Start of a chunk: its first and last time [ns], and its unpacked size [bytes]."""
+
+INDEX: Final = struct.Struct("<HI")
+"""Start of the index of a chunk: channel, and length of the places of its messages [bytes]."""
+
+PLACE_BYTES: Final = 16
+"""Length of the place of a message in such an index."""
+
+MAGIC_BYTES: Final = 8
+
+CHANNEL_CODE, MESSAGE_CODE, CHUNK_CODE, INDEX_CODE = 0x04, 0x05, 0x06, 0x07
+ATTACHMENT_CODE, METADATA_CODE, END_CODE = 0x09, 0x0C, 0x0F
+
+MAX_RECORDS = 1_000_000
+"""Maximum number of records of a file; a second of motion has about ten."""
 
 WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
 """Pattern of a whole number of nanoseconds."""
@@ -134,13 +149,13 @@ def checked_size(chunk: Chunk) -> int:
     return size
 
 
-def chunk_content(chunk: Chunk, limit: int) -> bytes:
-    """Return the records in ``chunk``, of up to ``limit`` bytes. Raises one of FAULTS."""
+def chunk_content(chunk: Chunk) -> bytes:
+    """Return the records in ``chunk``. Raises one of FAULTS, also for one that is too large."""
     if chunk.compression not in ("", "zstd"):
         raise ValueError(f"its chunks are compressed by {chunk.compression!r}, not by zstd")
     size = checked_size(chunk)
-    if size > limit:
-        raise ValueError(f"a chunk has {size} bytes, more than {limit}")
+    if size > MAX_CHUNK_BYTES:
+        raise ValueError(f"a chunk has {size} bytes, more than {MAX_CHUNK_BYTES}")
     content = chunk.data
     if chunk.compression == "zstd":
         content = zstandard.ZstdDecompressor().decompress(chunk.data)
@@ -197,54 +212,63 @@ def records_at(stream: BoundedStream, offset: int) -> Iterator[Any]:
     return iter(reader.records)
 
 
-def messages_at(
-    stream: BoundedStream,
-    offset: int,
-    channels: Mapping[int, str],
-    topics: Collection[str],
-    limit: int = MAX_CHUNK_BYTES,
-) -> list[Message]:
-    """Return the messages of ``topics`` in the chunk at ``offset``, of up to ``limit`` bytes.
-
-    Raises one of FAULTS.
-    """
-    wanted = {number: topic for number, topic in channels.items() if topic in topics}
-    return list(messages_in(content_at(stream, offset, limit), wanted))
-
-
-def content_at(stream: BoundedStream, offset: int, limit: int) -> bytes:
+def content_at(stream: BoundedStream, offset: int) -> bytes:
     """Return the records in the chunk at ``offset``. Raises one of FAULTS."""
     chunk = next(records_at(stream, offset))
     if not isinstance(chunk, Chunk):
-        raise ValueError("its index is wrong")
-    return chunk_content(chunk, limit)
+        raise ValueError("its chunks are wrong")
+    return chunk_content(chunk)
+
+
+class ChunkSpan(NamedTuple):
+    """A chunk: its place in the file, its times [ns], and its number of messages by channels."""
+
+    offset: int
+    first: int
+    last: int
+    counts: Mapping[int, int]
+
+    @property
+    def start(self) -> float:
+        """Time of its first message [s]."""
+        return self.first / NANO
+
+    @property
+    def end(self) -> float:
+        """Time of its last message [s]."""
+        return self.last / NANO
 
 
 class RecordingFile:
-    """A recording that is read by its index. For use in one thread."""
+    """A recording, also one without an end: after a crash, or while a server writes it.
 
-    def __init__(self, path: Path, file: BinaryIO) -> None:
-        """Read the index of ``file``; use ``open`` instead."""
+    Only the heads of records are read at first, in some milliseconds. For use in one thread.
+    """
+
+    def __init__(self, path: Path, file: BinaryIO | None = None) -> None:
+        """Find the chunks of the recording at ``path``. Raises InputError.
+
+        ``file``: it, open for reading; without it, it is opened for each read.
+        """
         self.path = path
-        self._stream = BoundedStream(file)
-        with reading(self.path):
-            self._reader = SeekingReader(
-                self._stream,  # type: ignore[arg-type]  # it has all that is used of a file
-                validate_crcs=True,
-                record_size_limit=MAX_RECORD_BYTES,
-            )
-            self.summary = self._summary()
-            """Index of the file, as MCAP has it."""
-            channels = self.summary.channels.values()
-            self._topics = {channel.id: channel.topic for channel in channels}
-            self._chunks = sorted(
-                self.summary.chunk_indexes, key=lambda record: record.chunk_start_offset
-            )
-            named = {record.name: dict(record.metadata) for record in self._reader.iter_metadata()}
-        if METADATA not in named:
-            raise InputError(f"{path} is an MCAP file, but no recording of katana450.")
-        self.metadata: Mapping[str, str] = named[METADATA]
+        self._file = file
+        self.metadata: Mapping[str, str] = {}
         """Texts about the recording by their names."""
+        self.chunks: list[ChunkSpan] = []
+        """The chunks, in the order of the file."""
+        self.size = 0
+        """Length of the file [bytes]."""
+        self.ended = False
+        """Whether the file has its end."""
+        self._topics: dict[int, str] = {}
+        self._attachments: list[int] = []
+        self._next, self._count = MAGIC_BYTES, 0
+        with self._reading() as stream:
+            # This checks the magic number.
+            next(records_at(stream, 0))
+        self.update()
+        if not self.metadata:
+            raise InputError(f"{path} is an MCAP file, but no recording of katana450.")
 
     @classmethod
     @contextmanager
@@ -255,20 +279,75 @@ class RecordingFile:
         except OSError as error:
             raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
         with file:
-            yield cls(path, file)
+            recording = cls(path, file)
+            recording._check_newest()
+            yield recording
 
-    def _summary(self) -> Summary:
-        try:
-            summary = self._reader.get_summary()
-        except FAULTS as error:
-            # The beginning was valid, so the end is missing.
-            raise InputError(
-                f"{self.path} has no valid end, as after a crash. Repair it with "
-                f"`katana450 record recover {self.path}`."
-            ) from error
-        if summary is None or not summary.channels:
-            raise InputError(f"{self.path} has no index, so it is not a whole recording.")
-        return summary
+    @contextmanager
+    def _reading(self) -> Iterator[BoundedStream]:
+        with reading(self.path):
+            if self._file is not None:
+                yield BoundedStream(self._file)
+            else:
+                with self.path.open("rb") as file:
+                    yield BoundedStream(file)
+
+    def update(self) -> None:
+        """Find the chunks that were added since the last call. Raises InputError."""
+        if not self.ended:
+            with self._reading() as stream:
+                self._scan(stream)
+
+    def _scan(self, stream: BoundedStream) -> None:
+        self.size = stream.size
+        while self._next + HEAD.size <= stream.size:
+            stream.seek(self._next)
+            code, length = HEAD.unpack(stream.read(HEAD.size))
+            if code == 0 or self._next + HEAD.size + length > stream.size:
+                # The rest is not written yet, or was lost in a crash.
+                break
+            if code == CHUNK_CODE:
+                self._add_chunk(stream)
+            elif code == INDEX_CODE and self.chunks:
+                channel, places = INDEX.unpack(stream.read(INDEX.size))
+                counts = {**self.chunks[-1].counts, channel: places // PLACE_BYTES}
+                self.chunks[-1] = self.chunks[-1]._replace(counts=counts)
+            elif code == METADATA_CODE:
+                record = next(records_at(stream, self._next))
+                if isinstance(record, Metadata) and record.name == METADATA:
+                    self.metadata = dict(record.metadata)
+            elif code == ATTACHMENT_CODE:
+                self._attachments.append(self._next)
+            elif code == END_CODE:
+                self.ended = True
+                return
+            self._next += HEAD.size + length
+            self._count += 1
+            if self._count > MAX_RECORDS:
+                raise ValueError(f"it has more than {MAX_RECORDS} records")
+
+    def _add_chunk(self, stream: BoundedStream) -> None:
+        first, last, size = TIMES.unpack(stream.read(TIMES.size))
+        if size > MAX_CHUNK_BYTES:
+            raise ValueError(f"a chunk has {size} bytes, more than {MAX_CHUNK_BYTES}")
+        if not self.chunks:
+            # All channels are described in the first chunk.
+            self._topics = channels_in(content_at(stream, self._next))
+        self.chunks.append(ChunkSpan(self._next, first, last, {}))
+
+    def _check_newest(self) -> None:
+        """Count the messages of the newest chunk, which a crash may have left without its index.
+
+        One that was not written as a whole is left out.
+        """
+        if self.ended or not self.chunks:
+            return
+        newest = self.chunks.pop()
+        with suppress(InputError), self._reading() as stream:
+            messages = messages_in(content_at(stream, newest.offset), self._topics)
+            topics = Counter(message.topic for message in messages)
+            counts = {number: topics[topic] for number, topic in self._topics.items()}
+            self.chunks.append(newest._replace(counts=counts))
 
     @property
     def start(self) -> float:
@@ -276,18 +355,20 @@ class RecordingFile:
 
         Ticks before the start of a part that was cut out serve its simulation only.
         """
-        first = min((chunk.message_start_time for chunk in self._chunks), default=0) / NANO
-        return max(first, part_start_of(self.metadata))
+        return max(min((chunk.start for chunk in self.chunks), default=0.0), self.part_start)
+
+    @property
+    def part_start(self) -> float:
+        """Start of a part that was cut out of a recording [s]; -inf for a whole one."""
+        try:
+            return float(self.metadata.get(PART_START, "-inf"))
+        except ValueError:
+            return -math.inf
 
     @property
     def end(self) -> float:
         """Time of the last message [s]; 0 if there is none."""
-        return max((chunk.message_end_time for chunk in self._chunks), default=0) / NANO
-
-    @property
-    def size(self) -> int:
-        """Length of the file [bytes]."""
-        return self._stream.size
+        return max((chunk.end for chunk in self.chunks), default=0.0)
 
     @property
     def settings(self) -> RecordedSettings:
@@ -302,21 +383,24 @@ class RecordingFile:
 
     @property
     def utc_offset(self) -> float:
-        """Seconds to add to the times of the recording for seconds since the epoch."""
-        return utc_offset_of(self.metadata)
+        """Seconds to add to the times of the recording for those since the epoch; 0 if unknown."""
+        return utc_offset_ns(self.metadata) / NANO
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield the files that belong to the recording. Raises InputError."""
-        with reading(self.path):
-            for file in self._reader.iter_attachments():
-                yield Attachment(file.name, file.media_type, file.data, file.log_time)
+        for offset in self._attachments:
+            with self._reading() as stream:
+                file = next(records_at(stream, offset))
+                if not isinstance(file, McapAttachment):
+                    raise ValueError("its attachments are wrong")
+            yield Attachment(file.name, file.media_type, file.data, file.log_time)
 
     def counts(self) -> dict[str, int]:
-        """Return the number of messages of each topic; nothing if the file does not state them."""
-        if self.summary.statistics is None:
-            return {}
-        counts = self.summary.statistics.channel_message_counts
-        return {topic: counts.get(channel, 0) for channel, topic in self._topics.items()}
+        """Return the number of messages of each topic."""
+        return {
+            topic: sum(chunk.counts.get(channel, 0) for chunk in self.chunks)
+            for channel, topic in self._topics.items()
+        }
 
     def messages(
         self, *topics: str, start: float = -math.inf, end: float = math.inf
@@ -325,54 +409,36 @@ class RecordingFile:
 
         Raises InputError where the file is damaged.
         """
-        wanted = frozenset(topics)
         first, last = nanoseconds_of(start), nanoseconds_of(end)
-        for index in self._chunks:
-            if (
-                index.message_end_time >= first
-                and index.message_start_time <= last
-                and self._has(index, wanted)
-            ):
-                for message in self._messages(index, wanted):
+        for chunk in self.chunks:
+            if chunk.last >= first and chunk.first <= last and self.has(chunk, *topics):
+                for message in self.messages_of(chunk, *topics):
                     if first <= message.log_time <= last:
                         yield message
 
     def last_before(self, topic: str, t: float) -> Message | None:
         """Return the last message of ``topic`` at or before ``t`` [s]; None if there is none."""
-        wanted = frozenset((topic,))
-        for index in reversed(self._chunks):
-            if index.message_start_time <= nanoseconds_of(t) and self._has(index, wanted):
-                last = nanoseconds_of(t)
-                messages = [
-                    message for message in self._messages(index, wanted) if message.log_time <= last
-                ]
-                if messages:
-                    return messages[-1]
+        last = nanoseconds_of(t)
+        for chunk in reversed(self.chunks):
+            if chunk.first <= last and self.has(chunk, topic):
+                for message in reversed(self.messages_of(chunk, topic)):
+                    if message.log_time <= last:
+                        return message
         return None
 
-    def _has(self, index: ChunkIndex, topics: frozenset[str]) -> bool:
-        return any(self._topics.get(channel) in topics for channel in index.message_index_offsets)
+    def has(self, chunk: ChunkSpan, *topics: str) -> bool:
+        """Return whether ``chunk`` has messages of ``topics``."""
+        return any(count and self._topics.get(n) in topics for n, count in chunk.counts.items())
 
-    def _messages(self, index: ChunkIndex, topics: frozenset[str]) -> list[Message]:
-        with reading(self.path):
-            return messages_at(self._stream, index.chunk_start_offset, self._topics, topics)
-
-
-def part_start_of(metadata: Mapping[str, str]) -> float:
-    """Return the start of a part that was cut out of a recording [s]; -inf for a whole one."""
-    try:
-        return float(metadata.get(PART_START, "-inf"))
-    except ValueError:
-        return -math.inf
-
-
-def utc_offset_of(metadata: Mapping[str, str]) -> float:
-    """Return the seconds from times of a recording to those since the epoch; 0 if unknown."""
-    return utc_offset_ns(metadata) / NANO
+    def messages_of(self, chunk: ChunkSpan, *topics: str) -> list[Message]:
+        """Return the messages of ``topics`` in ``chunk``. Raises InputError."""
+        wanted = {number: topic for number, topic in self._topics.items() if topic in topics}
+        with self._reading() as stream:
+            return list(messages_in(content_at(stream, chunk.offset), wanted))
 
 
 def utc_offset_ns(metadata: Mapping[str, str]) -> int:
-    """Return that time in nanoseconds, which is exact."""
+    """Return the nanoseconds from times of a recording to those since the epoch; 0 if unknown."""
     text = metadata.get("utc_offset_ns", "")
     return int(text) if WHOLE.fullmatch(text) else 0
 

@@ -1,7 +1,7 @@
 """Writers of recordings: MCAP files with JSON messages, in chunks with their indexes.
 
 A message is on the disk after ``flush`` and ``os.fsync`` of the file, which the caller does about
-once a second. What was synced before a crash can be recovered.
+once a second. What was synced before a crash can be read.
 """
 
 from __future__ import annotations
@@ -283,7 +283,7 @@ class _Written:
 class RecordingWriter:
     """Writes the ticks of one session to a file. For use in one thread.
 
-    Every method may raise OSError. The file is then good for ``recover`` only.
+    Every method may raise OSError. The file then has no end.
     """
 
     def __init__(self, file: BinaryIO, header: RecordingHeader) -> None:

@@ -1,10 +1,14 @@
-"""A part of a recording, or of several that follow each other, as a recording of its own."""
+"""A part of a recording, or of several that follow each other, as a recording of its own.
+
+That of a file without an end, as after a crash, has one.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -19,6 +23,7 @@ from katana450.extensions.recording.files.recording_file import (
 )
 from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.files.script_runs import begun_before, scripts_in
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,
@@ -82,6 +87,45 @@ def trim(
         begin = _checkpoint_before(files, first)
         write_files({out: lambda target: _write(target, files, (first, last), begin, episode)})
     return Trimmed(first, last, begin)
+
+
+def keep(
+    folder: Path,
+    out: Path,
+    last: float = math.inf,
+    part: tuple[float, float] = (-math.inf, math.inf),
+) -> Trimmed:
+    """Write the last seconds of the ring in ``folder`` to ``out``; return what was written.
+
+    The server may still write: of its present file, the part that is on the disk is taken. Only
+    files of the newest run of the server are joined.
+
+    Args:
+        folder: folder of the ring.
+        out: the new file.
+        last: time before the end of the recording [s].
+        part: its first and last moment [s since the epoch].
+
+    Raises:
+        InputError: the folder has no recording, or ``out`` cannot be written.
+    """
+    paths: list[Path] = []
+    offset, end = 0.0, -math.inf
+    for path in reversed(recordings_in(folder)):
+        # One without a beginning, or that the server has removed meanwhile.
+        with suppress(InputError), RecordingFile.open(path) as file:
+            if paths and file.utc_offset != offset:
+                break
+            if file.chunks:
+                paths.append(path)
+                offset, end = file.utc_offset, max(end, file.end)
+    if not paths:
+        raise InputError(
+            f"{folder} has no recording. A server names its folder at the start; nothing is "
+            "recorded while the arm rests."
+        )
+    start, stop = (t - offset for t in part)
+    return trim(paths, out, max(end - last, start), min(end, stop))
 
 
 def _checkpoint_before(files: Sequence[RecordingFile], t: float) -> float | None:

@@ -22,10 +22,9 @@ from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.progress import report, report_to
 from katana450.extensions.recording.datasets.export_command import export
-from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import session_for, verified
-from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.files.trimming import keep, trim
 from katana450.extensions.recording.options import USED
 from katana450.extensions.recording.run_again.again_command import script_of_part
 from katana450.platform_support import lower_priority

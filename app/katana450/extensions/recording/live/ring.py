@@ -16,12 +16,10 @@ from typing import Any, BinaryIO
 from katana450.arm.control.state.event_log import entries_between
 from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
-from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import EpisodeMessage
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
-from katana450.extensions.recording.files.recovery import recover
-from katana450.extensions.recording.folders import SUFFIX, claimed, recordings_in
+from katana450.extensions.recording.folders import SUFFIX, recordings_in
 from katana450.extensions.recording.live.run_events import RunEvents
 from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.platform_support import create_file
@@ -94,7 +92,7 @@ class Ring:
         clock: Callable[[], float] = time.monotonic,
         scripts: RunningScripts | None = None,
     ) -> None:
-        """Use ``folder``, which need not exist. Files that a crash left open are repaired.
+        """Use ``folder``, which need not exist.
 
         ``scripts``: the scripts that run, whose texts are attached.
         """
@@ -124,7 +122,6 @@ class Ring:
         """Why the disk takes nothing now, as a sentence; empty while it does."""
         self.last_t = float("-inf")
         """Time of the newest tick [s]."""
-        _repair(folder)
 
     @property
     def unsynced(self) -> bool:
@@ -283,8 +280,6 @@ class Ring:
             self._synced_bytes = 0
             self._path = self._folder / f"{time.time_ns() // 1000}{SUFFIX}"
             self._file = open(create_file(self._path, 0o600), "wb")  # noqa: SIM115 - for a minute
-            # So that nobody repairs it before its end.
-            claimed(self._file)
             self._writer = RecordingWriter(self._file, self._header)
         except OSError as error:
             self._fail(error)
@@ -294,7 +289,7 @@ class Ring:
         return self._writer is not None
 
     def _fail(self, error: OSError) -> None:
-        """End the present file after what was synced of it, which can be recovered."""
+        """End the present file after what was synced of it, which can be read."""
         self._report(error)
         self._disk_error = f"The disk took nothing: {error.strerror or error}."
         self.problem = f"Nothing is recorded now: {error.strerror or error}. Free some disk space."
@@ -314,18 +309,3 @@ class Ring:
 
     def _report(self, error: OSError) -> None:
         log.error("The recording in %s is interrupted: %s.", self._folder, error.strerror or error)
-
-
-def _repair(folder: Path) -> None:
-    """Make whole files of those that a crash left open."""
-    for path in recordings_in(folder):
-        try:
-            recovered = recover(path, path)
-        except InputError as error:
-            # Another server may write it; otherwise it is removed in its turn.
-            log.warning("%s", error)
-        except OSError as error:
-            log.warning("%s could not be repaired: %s.", path, error.strerror or error)
-        else:
-            if recovered is not None:
-                log.warning("%s was repaired: %s.", path, recovered)

@@ -17,7 +17,7 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -62,7 +62,7 @@ class OpenedRun:
         self._asked: float | None = None
         self.spans: tuple[Span, ...] = ()
         """The times with records; empty before ``update``."""
-        self.metadata: dict[str, str] = {}
+        self.metadata: Mapping[str, str] = {}
         """Texts about the file."""
 
     def update(self) -> None:

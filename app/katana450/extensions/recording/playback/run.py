@@ -5,12 +5,12 @@ from __future__ import annotations
 import threading
 from bisect import bisect_right
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from katana450.errors import InputError
-from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.files.recording_file import ChunkSpan, Message, RecordingFile
 from katana450.extensions.recording.files.simulation import TickReader, content_of
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
@@ -20,7 +20,6 @@ from katana450.extensions.recording.messages import (
     STATE,
     StateRow,
 )
-from katana450.extensions.recording.playback.chunks import ChunkIndex, ChunkSpan
 from katana450.extensions.recording.playback.marks import Mark, add_marks
 from katana450.extensions.recording.playback.rows import (
     Block,
@@ -100,7 +99,7 @@ class _File:
     """One file, and what was read of it."""
 
     def __init__(self, path: Path) -> None:
-        self.index = ChunkIndex(path)
+        self.index = RecordingFile(path)
         self.reader = TickReader()
         self.marked = 0
         self.marks: list[Mark] = []
@@ -117,12 +116,12 @@ class _File:
         """Read what was added to the file. Raises InputError."""
         self.index.update()
         # The index of the newest chunk may still be missing.
-        while self._searched < len(self.chunks) and self.chunks[self._searched].channels:
+        while self._searched < len(self.chunks) and self.chunks[self._searched].counts:
             chunk = self.chunks[self._searched]
             if self.index.has(chunk, CHECKPOINTS):
                 self.starts.append(self._searched)
             if self.index.has(chunk, SOLIDS):
-                for message in self.index.messages(chunk, SOLIDS):
+                for message in self.index.messages_of(chunk, SOLIDS):
                     self._solid_bytes += len(message.data)
                     if self._solid_bytes > MAX_SOLID_BYTES:
                         raise InputError(
@@ -150,7 +149,7 @@ class PlaybackRun:
         self._blocks: OrderedDict[tuple[Path, int, int], Block] = OrderedDict()
         self._lock = threading.Lock()
         self._offset = 0.0
-        self.metadata: dict[str, str] = {}
+        self.metadata: Mapping[str, str] = {}
         """Texts about the newest file."""
 
     def update(self) -> None:
@@ -166,7 +165,7 @@ class PlaybackRun:
                 except InputError as error:
                     problem = error
                     continue
-                if not file.chunks or not file.index.metadata:
+                if not file.chunks:
                     continue
                 if files and file.index.utc_offset != files[0].index.utc_offset:
                     break
@@ -225,7 +224,7 @@ class PlaybackRun:
                 number = bisect_right(file.chunks, t, key=lambda chunk: chunk.start) - 1
                 for chunk in reversed(file.chunks[: number + 1]):
                     if file.index.has(chunk, STATE):
-                        states = file.index.messages(chunk, STATE)
+                        states = file.index.messages_of(chunk, STATE)
                         before = [state for state in states if state.t <= t]
                         if before:
                             return content_of(before[-1], StateRow)
@@ -260,7 +259,7 @@ class PlaybackRun:
         file, states = place.file, list[Message]()
         descriptions: list[Description] = []
         for number in range(place.first, place.last + 1):
-            messages = file.index.messages(file.chunks[number], STATE, CHECKPOINTS)
+            messages = file.index.messages_of(file.chunks[number], STATE, CHECKPOINTS)
             complete = [message for message in messages if message.topic == CHECKPOINTS]
             descriptions += (description(file.reader, message) for message in complete)
             first = complete[0].number if complete else None
@@ -281,10 +280,10 @@ class PlaybackRun:
         return Block(states, descriptions)
 
     def _marks(self, file: _File) -> list[Mark]:
-        while file.marked < len(file.chunks) and file.chunks[file.marked].channels:
+        while file.marked < len(file.chunks) and file.chunks[file.marked].counts:
             chunk = file.chunks[file.marked]
             file.marked += 1
-            if file.index.has(chunk, EVENTS) or file.index.has(chunk, EPISODES):
-                add_marks(file.marks, file.index.messages(chunk, EVENTS, EPISODES))
+            if file.index.has(chunk, EVENTS, EPISODES):
+                add_marks(file.marks, file.index.messages_of(chunk, EVENTS, EPISODES))
                 del file.marks[:-MAX_MARKS]
         return file.marks
