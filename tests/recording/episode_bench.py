@@ -14,7 +14,7 @@ from katana450.extensions.recording.live.ring import Ring
 from katana450.server.api.episode_requests import episode_request
 from tests.recording.recorded import header, run
 
-ADA = EpisodeGiver("Ada", "operator", "0a1b2c3d4e5f")
+ADA = EpisodeGiver("Ada", "operator")
 
 
 @cache

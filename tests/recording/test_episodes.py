@@ -299,7 +299,6 @@ def test_full_disk_is_reported_and_the_episode_saved_later(
 def test_episode_states_what_the_disk_did_not_take(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(ring_module, "MAX_UNSYNCED", 40)
     monkeypatch.setattr(running_episode, "RETRY_SECONDS", 0.0)
     bench.ask(do="start", task="pour")
     bench.move(60)
@@ -309,15 +308,15 @@ def test_episode_states_what_the_disk_did_not_take(
         bench.move(1)
         bench.ring.sync()
         bench.move(100)
-        # The episode is not saved without what waits for the disk.
+        # The episode is not saved before the disk takes something again.
         with pytest.raises(InputError, match="No space left"):
             bench.ask(do="judge", outcome="success")
     bench.ring._retry_at = 0.0
     bench.keeper.tick()
-    assert bench.keeper.status()["last"]["missing_ticks"] == 61
-    assert bench.folder.find(1).episode.missing_ticks == 61
+    assert bench.keeper.status()["last"]["missing_ticks"] == 101
+    assert bench.folder.find(1).episode.missing_ticks == 101
     assert main(["record", "list", str(bench.folder.folder)]) == 0
-    assert "(61 ticks of 10 ms are missing)" in capsys.readouterr().out
+    assert "(101 ticks of 10 ms are missing)" in capsys.readouterr().out
 
 
 def _disk_full(_descriptor: int) -> None:

@@ -17,13 +17,10 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from katana450.arm.control.lease import Role
-from katana450.extensions.recording import folders
-from katana450.extensions.recording.folders import CLAIM, new_folder, remove_abandoned
 from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.playback import routes as routes_module
 from katana450.extensions.recording.playback.routes import OTHER, PlaybackRoutes
-from katana450.extensions.recording.playback.store import PREFIX, RecordingStore
-from katana450.platform_support import claim_file
+from katana450.extensions.recording.playback.store import RecordingStore
 from katana450.resources import URDF_PATH
 from katana450.server.service.identity import Identity
 from katana450.server.web.bodies import TOO_SLOW
@@ -106,17 +103,11 @@ def test_file_of_another_robot_is_opened_with_a_note(
     assert uploaded(store, parts(content), other)["note"] == OTHER
 
 
-def test_files_of_a_killed_server_are_removed_by_the_next(temporary: Path, tmp_path: Path) -> None:
-    killed = temporary / f"{PREFIX}killed"
-    killed.mkdir()
-    (killed / CLAIM).touch()
-    (killed / "opened.mcap").write_bytes(b"left")
-    first = RecordingStore(tmp_path)
-    assert not killed.exists()
-    first.new_path().write_bytes(b"in use")
-    second = RecordingStore(tmp_path)
+def test_files_are_removed_with_their_store(temporary: Path, tmp_path: Path) -> None:
+    store = RecordingStore(tmp_path)
+    store.new_path().write_bytes(b"in use")
     assert len(list(temporary.glob("*/*.mcap"))) == 1
-    del first, second
+    del store
     gc.collect()
     assert not list(temporary.iterdir())
 
@@ -155,23 +146,3 @@ def test_download_is_sent_in_parts_and_removed(
     with pytest.raises(OSError, match="has left"):
         asyncio.run(broken())
     assert not list(temporary.rglob("katana450.mcap"))
-
-
-def test_folder_that_another_process_takes_for_abandoned_is_not_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = tmp_path / "set"
-    raced: list[Path] = []
-
-    def claim_late(number: int) -> None:
-        if not raced:
-            # Just before the claim, another export looks for abandoned folders.
-            raced.extend(tmp_path.glob(f".set.*/{CLAIM}"))
-            remove_abandoned(raced)
-        claim_file(number)
-
-    monkeypatch.setattr(folders, "claim_file", claim_late)
-    with new_folder(out) as folder:
-        (folder / "content").write_text("whole")
-    assert len(raced) == 1
-    assert [path.name for path in out.iterdir()] == ["content"]

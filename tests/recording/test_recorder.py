@@ -209,7 +209,7 @@ def test_ring_keeps_the_newest_files(folder: Path, monkeypatch: pytest.MonkeyPat
     assert max(after - before for before, after in pairwise(ticks)) < 0.1
 
 
-def test_ticks_wait_in_memory_for_a_disk_that_takes_nothing(
+def test_ticks_that_a_full_disk_did_not_take_are_counted(
     folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     # A file stands where the folder should be.
@@ -218,8 +218,7 @@ def test_ticks_wait_in_memory_for_a_disk_that_takes_nothing(
     store = Ring(folder, header(), lambda: now[0])
     records: list[TickRecord] = []
     run(200, 6, records.append, odd=False)
-    for record in records[:20]:
-        store.put(record)
+    store.put_all(records[:20])
     assert "is interrupted" in caplog.text
     folder.unlink()
     # Not before the time of the next attempt.
@@ -233,19 +232,15 @@ def test_ticks_wait_in_memory_for_a_disk_that_takes_nothing(
     store.put_all(records[21:])
     store.close()
     (path,) = recordings_in(folder)
-    assert tick_times(path) == pytest.approx([record.t for record in records], abs=1e-8)
-    assert verified(path) == len(records) - 1
+    assert content_of_ticks(path) == ([(21, "File exists")], [r.t for r in records[21:]])
+    assert verified(path) == len(records) - 22
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of a process")
-@pytest.mark.parametrize(("memory", "missing"), [(3000, 0), (70, 50)])
-def test_ticks_that_a_full_disk_did_not_take_are_written_later_or_counted(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, memory: int, missing: int
-) -> None:
+def test_ticks_of_a_failed_sync_are_counted_and_not_there_twice(folder: Path) -> None:
     """They were given to the file, but the sync failed; so did the next two files."""
     import resource  # noqa: PLC0415 - not on Windows
 
-    monkeypatch.setattr(ring, "MAX_UNSYNCED", memory)
     now = [0.0]
     store = Ring(folder, header(), lambda: now[0])
     records: list[TickRecord] = []
@@ -260,30 +255,34 @@ def test_ticks_that_a_full_disk_did_not_take_are_written_later_or_counted(
         resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 100, before[1]))
         try:
             store.sync()
-            # Before the next attempt.
-            store.put_all([])
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, before)
         assert "Nothing is recorded now" in store.problem
     now[0] += ring.RETRY_SECONDS
     store.put_all(records[220:260])
-    store.sync()
     store.close()
     joined = folder.with_name("joined.mcap")
     # Files that took nothing are gone, and no tick is there twice.
     assert len(recordings_in(folder)) == 2
     keep(folder, joined)
-    with RecordingFile.open(joined) as file:
-        ticks = [json.loads(message.data) for message in file.messages(COMMANDS)]
-    gaps = [tick for tick in ticks if "missing" in tick]
-    assert [tick["t"] for tick in ticks if "missing" not in tick] == [
-        record.t for record in (*records[1 : 220 - missing], *records[220:260])
-    ]
-    assert sum(gap["ticks"] for gap in gaps) == missing
-    assert all("The disk took nothing: File too large" in gap["missing"] for gap in gaps)
+    gaps, times = content_of_ticks(joined)
+    assert gaps == [(120, "File too large")]
+    assert times == [record.t for record in (*records[1:100], *records[220:260])]
     result = katana450.open(joined).verify()
     assert result.identical
-    assert result.unknown == missing
+    assert result.unknown == 121
+
+
+def content_of_ticks(path: Path) -> tuple[list[tuple[int, str]], list[float]]:
+    """Return the number of ticks and the reason of each gap in ``path``, and times of ticks [s]."""
+    with RecordingFile.open(path) as file:
+        ticks = [json.loads(message.data) for message in file.messages(COMMANDS)]
+    gaps = [
+        (tick["ticks"], tick["missing"].removeprefix("The disk took nothing: ")[:-1])
+        for tick in ticks
+        if "missing" in tick
+    ]
+    return gaps, [tick["t"] for tick in ticks if "missing" not in tick]
 
 
 def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyPatch) -> None:

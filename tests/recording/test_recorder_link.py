@@ -53,7 +53,7 @@ def listen(bench: Bench, address: PrivateAddress) -> Iterator[Callable[..., Runn
 
     def begin(keeper: object = None) -> RunningScripts:
         scripts, present = RunningScripts(), keeper or bench.keeper
-        listeners.append(RecorderListener(present, scripts, address, b"salt"))  # type: ignore[arg-type]
+        listeners.append(RecorderListener(present, scripts, address))  # type: ignore[arg-type]
         return scripts
 
     yield begin
@@ -87,8 +87,7 @@ def test_requests_are_answered_and_the_state_is_shown(
     until(lambda: page.shown.get(ENTRY))
     assert caplog.text.count("Too many open files") == 1
     assert answer["number"] == 1
-    # People are named by pseudonyms in a recording.
-    assert answer["by"]["key"] not in ("", ADA.key)
+    assert answer["by"] == {"name": "Ada", "role": "operator"}
     until(lambda: page.shown[ENTRY]["running"])
     with pytest.raises(InputError, match="runs already"):
         link.ask(StartEpisode(), ADA)

@@ -189,7 +189,7 @@ def test_trimmed_episode_is_scored_and_run_again_in_its_range(
     path = tmp_path / "episode-0001.mcap"
     with RecordingFile.open(line) as file:
         begin, end = file.start, file.end
-    by = EpisodeGiver("Ada", "operator", "")
+    by = EpisodeGiver("Ada", "operator")
     episode = Episode(1, "lift", begin, end, EpisodeOutcome.SUCCESS, "", by)
     write_episode([line], path, episode)
     whole = score_file(path).values["tool_path_mm"] or 0.0

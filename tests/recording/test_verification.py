@@ -73,8 +73,7 @@ def test_every_part_is_identical_from_its_first_complete_state(
     assert len(starts) >= len(records) // 1500 + 1
     for start in starts[1:]:
         part = tmp_path / f"{start}.mcap"
-        part_file = trim([path], part, start, start + 4.0)
-        assert part_file.simulated_from == start
+        trim([path], part, start, start + 4.0)
         with RecordingFile.open(part) as file:
             result = verify_recording(file, described().session)
         assert result.identical, result
@@ -243,17 +242,15 @@ def test_command_describes_cuts_and_explains(
             return message
         return message._replace(data=message.data.replace(b'"digest":"', b'"digest":"0'))
 
-    changed = {"cpu": "Another processor", "libm_rounding": "0123456789ab"}
     for metadata, words in (
         ({}, "so the recording was changed"),
-        (changed, "cpu: Another processor there"),
+        ({"cpu": "Another processor"}, "cpu: Another processor there"),
     ):
         write_copy(part, foreign, metadata=metadata, change=change)
         assert main(["record", "verify", str(foreign)]) == 1
         output = capsys.readouterr().out
         assert "first difference at t = " in output
         assert words in output
-        assert ("libm_rounding" in output) is bool(metadata)
 
 
 @pytest.mark.parametrize(

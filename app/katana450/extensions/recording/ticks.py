@@ -22,7 +22,7 @@ import msgspec
 import numpy as np
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands.commands import Command
+from katana450.arm.control.commands.commands import Batch, Command, Stop
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.stopping import with_name
 from katana450.arm.control.state.arm_report import ArmReport
@@ -109,6 +109,36 @@ def _mode(mode: Mode) -> tuple[Any, ...]:
             target, since = target_content(mode.target)[1], target_content(mode.since)[1]
             return name, {"target": target, "since": since, "let_go": mode.let_go}
     return name, mode
+
+
+def without_identities(record: TickRecord) -> TickRecord:
+    """Return ``record`` without keys and addresses of people: a file that is passed on has none.
+
+    Names and roles stay. A key names the session of a browser. It does not influence the motion, so
+    a simulation of these records gives the same motion.
+    """
+    state = record.state
+    if state.stopped is not None and state.stopped.cause.key:
+        stopped = replace(state.stopped, cause=replace(state.stopped.cause, key=""))
+        state = replace(state, stopped=stopped)
+    submissions = [
+        Submission(_without_key(command), _without_identity(actor))
+        for command, actor in record.submissions
+    ]
+    return record._replace(submissions=submissions, state=state)
+
+
+def _without_key(command: Command) -> Command:
+    match command:
+        case Stop(cause=cause) if cause.key:
+            return Stop(replace(cause, key=""), command.finding, command.others)
+        case Batch(commands=commands):
+            return Batch(tuple(map(_without_key, commands)))
+    return command
+
+
+def _without_identity(actor: Actor | None) -> Actor | None:
+    return actor and replace(actor, person=replace(actor.person, key="", address=""))
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,12 +44,10 @@ class EpisodeGiver(msgspec.Struct, frozen=True):
     Attributes:
         name: display name.
         role: role on the server.
-        key: pseudonym, the same as in the commands of the recording.
     """
 
     name: str = ""
     role: str = ""
-    key: str = ""
 
 
 class Episode(msgspec.Struct, frozen=True):

@@ -126,8 +126,8 @@ class EpisodeRoutes:
 
 
 def giver_of(actor: Actor) -> EpisodeGiver:
-    """Return ``actor`` as the giver of an episode, with a key that is still no pseudonym."""
-    return EpisodeGiver(actor.name, actor.person.role.value, actor.key)
+    """Return ``actor`` as the giver of an episode."""
+    return EpisodeGiver(actor.name, actor.person.role.value)
 
 
 def described(file: KeptEpisode) -> dict[str, Any]:

@@ -8,15 +8,12 @@ code, with another order of rounding.
 from __future__ import annotations
 
 import hashlib
-import math
 import platform
-import secrets
-import struct
 import sys
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -34,22 +31,12 @@ from katana450.settings import Settings
 DISTANCES = "distances"
 """Entry that tells what measured the distances of bodies. Recordings by coal or FCL have none."""
 
-RELEVANT = (
-    *("version", "python", "numpy", DISTANCES, "blas", "libc", "machine", "cpu"),
-    *("libm_rounding", "blas_rounding", "numpy_rounding"),
-)
+RELEVANT = ("version", "python", "numpy", DISTANCES, "blas", "libc", "machine", "cpu")
 """Entries that show why a simulation may not give the same bits."""
-
-OF_PROCESS = ("libm_rounding", "blas_rounding", "numpy_rounding")
-"""The entries that depend on the environment variables of the process, not on the machine."""
-
-PROBES = 2000
-"""Number of arguments with which the rounding of functions is tried."""
 
 ROUNDING, PORTABLE = "rounding", "portable"
 """Entry that tells whether the process rounded alike on all x86-64 processors, and its value."""
 
-HASH_DIGITS = 12
 UNKNOWN = "unknown"
 
 
@@ -65,52 +52,17 @@ def fingerprint() -> dict[str, str]:
         "machine": f"{sys.platform} {platform.machine()}",
         "cpu": _cpu(),
         ROUNDING: PORTABLE if ROUNDS_PORTABLY else "of the processor",
-        "libm_rounding": _libm_rounding(),
-        "blas_rounding": _blas_rounding(),
-        "numpy_rounding": _numpy_rounding(),
     }
 
 
-def differences(recorded: Mapping[str, str], left_out: Collection[str] = ()) -> list[str]:
-    """Return in words what in ``recorded`` differs from this machine, of the relevant entries.
-
-    ``left_out``: entries that do not count.
-    """
+def differences(recorded: Mapping[str, str]) -> list[str]:
+    """Return in words what in ``recorded`` differs from this machine, of the relevant entries."""
     present = fingerprint()
     return [
         f"{name}: {recorded.get(name, UNKNOWN)} there, {present[name]} here"
         for name in RELEVANT
-        if name not in left_out and recorded.get(name, UNKNOWN) != present[name]
+        if recorded.get(name, UNKNOWN) != present[name]
     ]
-
-
-def _libm_rounding() -> str:
-    """Return a hash of results of libm, which differ in the last bit between processors."""
-    digest = hashlib.sha256()
-    for number in range(1, PROBES):
-        x = number / 317.0
-        results = (math.sin(x), math.cos(x), math.atan2(x, 3.0), math.exp(-x), x**0.3)
-        digest.update(struct.pack("<5d", *results))
-    return digest.hexdigest()[:HASH_DIGITS]
-
-
-def _blas_rounding() -> str:
-    """Return a hash of products and a least-squares fit by BLAS, of the sizes that are used."""
-    numbers = np.arange(1.0, 1.0 + PROBES) % 0.7
-    digest = hashlib.sha256()
-    for n in (3, 4, 5, 6, 16):
-        A = numbers[: 20 * n].reshape(20, n)
-        for result in (A @ A.T, A[:n] @ A[:n], A.T @ A, A @ A[0], A[0] @ A[1]):
-            digest.update(np.ascontiguousarray(result).tobytes())
-        digest.update(np.linalg.lstsq(A, numbers[:20], rcond=None)[0].tobytes())
-    return digest.hexdigest()[:HASH_DIGITS]
-
-
-def _numpy_rounding() -> str:
-    """Return a hash of functions of whole arrays, for which numpy has code of its own."""
-    x = np.arange(1.0, 1.0 + PROBES) / 317.0
-    results = (np.sin(x), np.cos(x), np.tan(x), np.arctan2(x, 3.0), np.exp(-x), np.log(x), x**0.3)
-    return hashlib.sha256(b"".join(row.tobytes() for row in results)).hexdigest()[:HASH_DIGITS]
 
 
 def _blas() -> str:
@@ -177,14 +129,12 @@ class RecordingHeader:
         environment: gives the poses of objects in the hand; None to leave them out.
         metadata: texts by their names, see ``header_of``.
         attachments: files that belong to it.
-        salt: random bytes for the pseudonyms of people; files that are to be joined have the same.
     """
 
     robot: Robot
     environment: Environment | None
     metadata: Mapping[str, str]
     attachments: tuple[Attachment, ...] = ()
-    salt: bytes = field(default_factory=lambda: secrets.token_bytes(16), repr=False)
 
 
 def header_of(

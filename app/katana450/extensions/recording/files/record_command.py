@@ -20,14 +20,13 @@ from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episodes_in
 from katana450.extensions.recording.files.header import (
     DISTANCES,
-    OF_PROCESS,
     differences,
     fingerprint,
 )
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
-from katana450.extensions.recording.files.simulation import simulates_apart, verified
-from katana450.extensions.recording.files.trimming import Trimmed, keep, trim
+from katana450.extensions.recording.files.simulation import verified
+from katana450.extensions.recording.files.trimming import keep, trim
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.ticks import Verification
 
@@ -35,6 +34,11 @@ PROGRESS_STEP = 0.02
 """[1] Fraction of a recording after which the progress is shown again."""
 
 MB = 1e6
+
+SAME_PROGRAM = (
+    "Program, libraries and processor are the same, so the recording was changed, or the process "
+    "that made it rounded otherwise."
+)
 
 SAME = 1e-9
 """[rad or m] Difference of a setpoint that the rounding of distances can make."""
@@ -128,14 +132,13 @@ def _verify(path: Path, urdf: Path | None, *, as_json: bool) -> int:
         if same_setpoints(result, file.metadata):
             print(OTHER_DISTANCES)
             return 0
-        # The process that simulated it rounds as the one that recorded it.
-        others = differences(file.metadata, OF_PROCESS if simulates_apart(file) else ())
+        others = differences(file.metadata)
         if others:
             print("It was made by another program or machine, whose rounding can differ:")
             for difference in others:
                 print(printable(f"  {difference}"))
         else:
-            print("Program, libraries and rounding are the same, so the recording was changed.")
+            print(SAME_PROGRAM)
     return 1
 
 
@@ -183,10 +186,8 @@ def _trim(paths: list[Path], out: Path, start: float, end: float) -> int:
     return _written(out, trim(paths, out, first + start, first + end))
 
 
-def _written(out: Path, part: Trimmed) -> int:
-    print(printable(f"{out}: {part.end - part.start:.1f} s."))
-    if part.simulated_from is None:
-        print("No complete state lies before its end, so it cannot be verified.")
+def _written(out: Path, part: tuple[float, float]) -> int:
+    print(printable(f"{out}: {part[1] - part[0]:.1f} s."))
     return 0
 
 

@@ -62,8 +62,7 @@ from katana450.extensions.recording.messages import (
     TickMessage,
     nanoseconds,
 )
-from katana450.extensions.recording.pseudonyms import Pseudonyms
-from katana450.extensions.recording.ticks import Digester, tick_message
+from katana450.extensions.recording.ticks import Digester, tick_message, without_identities
 
 MAGIC = b"\x89MCAP0\r\n"
 """First and last bytes of an MCAP file."""
@@ -290,7 +289,6 @@ class RecordingWriter:
         """Begin a recording in ``file``, which is open for writing and empty."""
         self._writer = MessageWriter(file, header.metadata, header.attachments)
         self._codec, self._digester = Codec(), Digester()
-        self._pseudonyms = Pseudonyms(header.salt)
         self._messages = StateMessages(header.robot, header.environment)
         self._number = 0
         self._written = _Written()
@@ -306,7 +304,7 @@ class RecordingWriter:
 
         A tick with a value that has no form is written as missing, with the reason.
         """
-        record, written = self._pseudonyms.record(record), self._written
+        record, written = without_identities(record), self._written
         state, t = record.state, record.t
         self._number += 1
         try:

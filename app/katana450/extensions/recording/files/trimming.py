@@ -9,7 +9,6 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -47,25 +46,10 @@ CHUNK_SECONDS = 1.0
 """[s] Time after which a chunk ends, as in a recording; the index is by chunks."""
 
 
-@dataclass(frozen=True)
-class Trimmed:
-    """A part of a recording.
-
-    Attributes:
-        start, end: its first and last moment [s].
-        simulated_from: time [s] of the complete state from which it can be simulated; None if there
-            is none before its end.
-    """
-
-    start: float
-    end: float
-    simulated_from: float | None
-
-
 def trim(
     sources: Sequence[Path], out: Path, start: float, end: float, episode: bytes | None = None
-) -> Trimmed:
-    """Write the part from ``start`` to ``end`` [s] of ``sources`` to ``out``.
+) -> tuple[float, float]:
+    """Write the part from ``start`` to ``end`` [s] of ``sources`` to ``out``; return both times.
 
     The sources are files of one session, which are put into the order of their times. The ticks
     from the last complete state before ``start`` on are kept too, so that the part can be simulated
@@ -86,7 +70,7 @@ def trim(
             raise InputError("The files are not of one run of the server, so their times differ.")
         begin = _checkpoint_before(files, first)
         write_files({out: lambda target: _write(target, files, (first, last), begin, episode)})
-    return Trimmed(first, last, begin)
+    return first, last
 
 
 def keep(
@@ -94,8 +78,8 @@ def keep(
     out: Path,
     last: float = math.inf,
     part: tuple[float, float] = (-math.inf, math.inf),
-) -> Trimmed:
-    """Write the last seconds of the ring in ``folder`` to ``out``; return what was written.
+) -> tuple[float, float]:
+    """Write the last seconds of the ring in ``folder`` to ``out``; return their begin and end [s].
 
     The server may still write: of its present file, the part that is on the disk is taken. Only
     files of the newest run of the server are joined.

@@ -75,7 +75,7 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
         if supervisor.ended.is_set():
             return
         keeper = _episodes(config, ring, header, supervisor.ended)
-        listener = _listener(config, keeper, scripts, header.salt, supervisor.ended)
+        listener = _listener(config, keeper, scripts, supervisor.ended)
         try:
             while True:
                 _receive(pipe, ring)
@@ -125,14 +125,13 @@ def _listener(
     config: RecorderConfig,
     keeper: EpisodeKeeper | InputError,
     scripts: RunningScripts,
-    salt: bytes,
     ended: threading.Event,
 ) -> RecorderListener | None:
     """Return what takes requests of the page's server; None if it cannot, or the server ends."""
     from katana450.extensions.recording.live.recorder_link import RecorderListener
 
     try:
-        return RecorderListener(keeper, scripts, config.address, salt)
+        return RecorderListener(keeper, scripts, config.address)
     except OSError as error:
         # A server that ends removes the folder of the address.
         if not ended.wait(END_NOTICE_TIME):

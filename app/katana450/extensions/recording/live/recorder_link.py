@@ -29,7 +29,6 @@ from katana450.arm.runtime.pipes.private_listener import (
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import EpisodeGiver
 from katana450.extensions.recording.live.running_scripts import RunningScripts, ScriptNote
-from katana450.extensions.recording.pseudonyms import Pseudonyms
 from katana450.server.api.episode_requests import AnyEpisodeRequest
 from katana450.server.service.hub import Hub
 
@@ -75,7 +74,7 @@ log = logging.getLogger(__name__)
 
 
 class GivenRequest(msgspec.Struct, frozen=True, tag="request"):
-    """A request about episodes. The ``key`` of its giver becomes a pseudonym."""
+    """A request about episodes."""
 
     number: int
     request: AnyEpisodeRequest
@@ -108,7 +107,6 @@ class RecorderListener:
         keeper: EpisodeKeeper | InputError,
         scripts: RunningScripts,
         address: PrivateAddress,
-        salt: bytes,
     ) -> None:
         """Listen at ``address``. Raises OSError if it cannot be used.
 
@@ -116,9 +114,8 @@ class RecorderListener:
             keeper: executes the requests about episodes; the reason if there are none.
             scripts: takes the notes of scripts.
             address: address of this process.
-            salt: random bytes for the pseudonyms of people, as in the recording.
         """
-        self._keeper, self._scripts, self._pseudonyms = keeper, scripts, Pseudonyms(salt)
+        self._keeper, self._scripts = keeper, scripts
         self._newest: Connection | None = None
         self._sending = threading.Lock()
         roles: Roles = {PAGE: self._serve}
@@ -180,11 +177,10 @@ class RecorderListener:
                 keeper.wait(revision, ACTIVE_SECONDS if keeper.active else IDLE_SECONDS)
 
     def _answer(self, connection: Connection, request: GivenRequest) -> None:
-        by = msgspec.structs.replace(request.by, key=self._pseudonyms.of(request.by.key))
         try:
             if isinstance(self._keeper, InputError):
                 raise self._keeper
-            answer = RequestAnswer(request.number, self._keeper.handle(request.request, by))
+            answer = RequestAnswer(request.number, self._keeper.handle(request.request, request.by))
         except InputError as error:
             answer = RequestAnswer(request.number, why=str(error))
         except Exception as error:

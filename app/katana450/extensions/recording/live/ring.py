@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -36,53 +35,17 @@ MAX_HELD_FILES = 80
 MAX_FILE_BYTES = 20_000_000
 """Size after which a file ends, whatever it contains, so that the ring is bounded."""
 
-MAX_UNSYNCED = 3000
-"""Number of ticks, 30 s of motion, that wait in memory for a disk that takes nothing."""
-
 RETRY_SECONDS = 5.0
 """[s] Time after an error of the disk until the next attempt to write."""
 
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class _Tick:
-    """The record of a tick, with its events: the kind of each and its further fields."""
-
-    record: TickRecord
-    events: list[tuple[str, Mapping[str, Any]]]
-    ticks: int = 1
-
-    @property
-    def t(self) -> float:
-        """Time of the tick [s]."""
-        return self.record.t
-
-    def write(self, writer: RecordingWriter) -> None:
-        """Write the tick and its events. Raises OSError."""
-        writer.put(self.record)
-        for kind, fields in self.events:
-            writer.event(self.t, kind, fields)
-
-
-@dataclass(frozen=True)
-class _Gap:
-    """A number of lost ticks, until the time ``t`` [s], with the reason."""
-
-    t: float
-    ticks: int
-    why: str
-
-    def write(self, writer: RecordingWriter) -> None:
-        """Write that the ticks are missing. Raises OSError."""
-        writer.lost(self.t, self.ticks, self.why)
-
-
 class Ring:
     """Writes records into the newest file of a folder, and removes the oldest files.
 
-    No method raises OSError. While the disk takes nothing, ``MAX_UNSYNCED`` ticks wait in memory;
-    further ones are lost, and the next file says how many.
+    No method raises OSError. While the disk takes nothing ticks are lost, and the next file says
+    how many.
     """
 
     def __init__(
@@ -103,8 +66,8 @@ class Ring:
         self._file: BinaryIO | None = None
         self._writer: RecordingWriter | None = None
         self._ticks = 0
-        # All that a failure of the disk would take from the present file, and the end of the rest.
-        self._unsynced: list[_Tick | _Gap] = []
+        # Ticks that a failure of the disk would take from the present file, and those it has taken.
+        self._unsynced = self._lost = 0
         self._synced_bytes = 0
         self._disk_error = ""
         self._retry_at = float("-inf")
@@ -126,11 +89,27 @@ class Ring:
     @property
     def unsynced(self) -> bool:
         """True if ``sync`` has something to bring to the disk."""
-        return bool(self._unsynced)
+        return bool(self._unsynced or self._lost)
 
     def put_all(self, records: Sequence[TickRecord]) -> None:
         """Write the records of successive ticks, with less work than by ``put`` for each."""
-        self._add([_Tick(record, self._events(record)) for record in records])
+        events = [self._events(record) for record in records]
+        written = 0
+        if self._opened():
+            assert self._writer is not None
+            try:
+                self._writer.prepare(records)
+                for record, tick_events in zip(records, events, strict=True):
+                    self._writer.put(record)
+                    for kind, fields in tick_events:
+                        self._writer.event(record.t, kind, fields)
+                    written += 1
+                self._ticks += written
+                self._unsynced += written
+            except OSError as error:
+                self._fail(error)
+                written = 0
+        self._lost += len(records) - written
         for record in records:
             self.last_t = record.t
             self._first_t = min(self._first_t, record.t)
@@ -139,27 +118,6 @@ class Ring:
     def put(self, record: TickRecord) -> None:
         """Write the record of a tick."""
         self.put_all([record])
-
-    def _add(self, entries: Sequence[_Tick | _Gap]) -> None:
-        """Write ``entries``, and keep them until they are on the disk."""
-        opened = self._opened()
-        self._unsynced.extend(entries)
-        if opened:
-            self._write(entries)
-        surplus = self._unsynced[MAX_UNSYNCED:]
-        if surplus and self._writer is None:
-            ticks = sum(entry.ticks for entry in surplus)
-            self._unsynced[MAX_UNSYNCED:] = [_Gap(surplus[-1].t, ticks, self._disk_error)]
-
-    def _write(self, entries: Sequence[_Tick | _Gap]) -> None:
-        assert self._writer is not None
-        try:
-            self._writer.prepare([entry.record for entry in entries if isinstance(entry, _Tick)])
-            for entry in entries:
-                entry.write(self._writer)
-                self._ticks += isinstance(entry, _Tick)
-        except OSError as error:
-            self._fail(error)
 
     def describe(self, t: float, episode: EpisodeMessage) -> None:
         """Write and sync the message ``episode`` about an episode at ``t`` [s]."""
@@ -225,12 +183,21 @@ class Ring:
         """Note that ``ticks`` ticks until ``t`` [s] never came."""
         why = "The process that records could not keep up."
         log.error("%d ticks until %.1f s were not recorded: %s", ticks, t, why)
-        self._add([_Gap(t, ticks, why)])
+        self.last_t = t
+        if not self._opened():
+            self._lost += ticks
+            return
+        assert self._writer is not None
+        self._unsynced += ticks
+        try:
+            self._writer.lost(t, ticks, why)
+        except OSError as error:
+            self._fail(error)
 
     def sync(self) -> None:
         """Bring everything to the disk, and begin a new file if this one is full."""
-        if self._unsynced:
-            # What waits for a disk that took nothing.
+        if self._lost:
+            # To say so, also if the arm rests now.
             self._opened()
         if self._writer is None or self._file is None:
             return
@@ -241,7 +208,7 @@ class Ring:
             self._synced_bytes = self._file.tell()
             full = self._synced_bytes >= MAX_FILE_BYTES or self._ticks >= MAX_FILE_TICKS
             self.problem = ""
-            self._unsynced.clear()
+            self._unsynced = 0
         except OSError as error:
             self._fail(error)
             return
@@ -251,22 +218,21 @@ class Ring:
     def close(self) -> None:
         """End the present file."""
         writer, file = self._writer, self._file
-        self._file = None
         if writer is None or file is None:
             return
         try:
             self._note_scripts()
             writer.close()
             os.fsync(file.fileno())
-            self._unsynced.clear()
         except OSError as error:
-            self._report(error)
-        self._writer = None
+            self._fail(error)
+            return
+        self._unsynced, self._writer, self._file = 0, None, None
         with suppress(OSError):
             file.close()
 
     def _opened(self) -> bool:
-        """Begin a file, with all that waits, if there is none; return whether there is one."""
+        """Begin a file if there is none; return whether there is one."""
         if self._writer is not None:
             return True
         if self._clock() < self._retry_at:
@@ -281,31 +247,31 @@ class Ring:
             self._path = self._folder / f"{time.time_ns() // 1000}{SUFFIX}"
             self._file = open(create_file(self._path, 0o600), "wb")  # noqa: SIM115 - for a minute
             self._writer = RecordingWriter(self._file, self._header)
+            self._ticks = 0
+            if self._lost:
+                self._writer.lost(self.last_t, self._lost, self._disk_error)
+            self._unsynced, self._lost = self._lost, 0
         except OSError as error:
             self._fail(error)
             return False
-        self._ticks = 0
-        self._write(self._unsynced)
-        return self._writer is not None
+        return True
 
     def _fail(self, error: OSError) -> None:
         """End the present file after what was synced of it, which can be read."""
-        self._report(error)
+        log.error("The recording in %s is interrupted: %s.", self._folder, error.strerror or error)
         self._disk_error = f"The disk took nothing: {error.strerror or error}."
         self.problem = f"Nothing is recorded now: {error.strerror or error}. Free some disk space."
         self._retry_at = self._clock() + RETRY_SECONDS
+        self._lost, self._unsynced = self._lost + self._unsynced, 0
         file, self._file, self._writer = self._file, None, None
         if file is None:
             return
         if not self._synced_bytes:
             self._path.unlink(missing_ok=True)
-        # The rest is written again, into the next file, and must not be there twice.
+        # The rest counts as lost, and must not be there too.
         descriptor = os.dup(file.fileno())
         with suppress(OSError):
             file.close()
         with suppress(OSError):
             os.ftruncate(descriptor, self._synced_bytes)
         os.close(descriptor)
-
-    def _report(self, error: OSError) -> None:
-        log.error("The recording in %s is interrupted: %s.", self._folder, error.strerror or error)

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 import secrets
-import shutil
-import tempfile
-import weakref
 from collections import OrderedDict
 from pathlib import Path
-from typing import BinaryIO
+from tempfile import TemporaryDirectory, mkdtemp
 
 from katana450.errors import InputError
-from katana450.extensions.recording.folders import (
-    CLAIM,
-    SUFFIX,
-    claimed_folder,
-    recordings_in,
-    remove_abandoned,
-)
+from katana450.extensions.recording.folders import SUFFIX, recordings_in
 from katana450.extensions.recording.playback.opened_run import OpenedRun
 from katana450.extensions.recording.playback.run import PlaybackRun
 
@@ -41,14 +32,9 @@ class RecordingStore:
     """Runs by their names. For use in one thread, except for the runs themselves."""
 
     def __init__(self, ring: Path | None) -> None:
-        """Offer the ring in the folder ``ring``, if there is one.
-
-        Files that a killed server has left are removed.
-        """
+        """Offer the ring in the folder ``ring``, if there is one."""
         self.ring = ring
-        remove_abandoned(Path(tempfile.gettempdir()).glob(f"{PREFIX}*/{CLAIM}"))
-        self._temporary, claim = claimed_folder(lambda: Path(tempfile.mkdtemp(prefix=PREFIX)))
-        weakref.finalize(self, _remove, self._temporary, claim)
+        self._temporary = TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True)
         self._ring = None if ring is None else PlaybackRun(lambda: recordings_in(ring))
         self._files: OrderedDict[str, tuple[Path, OpenedRun]] = OrderedDict()
 
@@ -69,11 +55,11 @@ class RecordingStore:
 
     def new_path(self) -> Path:
         """Return the path for a file that is being received."""
-        return self._temporary / f"{secrets.token_hex(8)}{SUFFIX}"
+        return Path(self._temporary.name) / f"{secrets.token_hex(8)}{SUFFIX}"
 
     def new_folder(self) -> Path:
         """Return a new folder for a file that is being made."""
-        return Path(tempfile.mkdtemp(dir=self._temporary))
+        return Path(mkdtemp(dir=self._temporary.name))
 
     def add(self, path: Path, run: OpenedRun) -> str:
         """Keep ``run`` of the file ``path``, and return its name."""
@@ -83,11 +69,6 @@ class RecordingStore:
             run.close()
             old.unlink(missing_ok=True)
         return path.stem
-
-
-def _remove(folder: Path, claim: BinaryIO) -> None:
-    claim.close()
-    shutil.rmtree(folder, ignore_errors=True)
 
 
 def opened(path: Path) -> OpenedRun:
