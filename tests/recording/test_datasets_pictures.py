@@ -19,7 +19,7 @@ from katana450.arm.robot.props import load_props
 from katana450.cli.main import main
 from katana450.extensions.media.options import CAMERAS
 from katana450.extensions.media.stage import RenderStage, Shot
-from katana450.extensions.recording.datasets.episode_video import EpisodeVideo
+from katana450.extensions.recording.datasets.lerobot_export import EpisodeVideo
 from katana450.extensions.recording.datasets.lerobot_writer import QUANTILES, PixelCounts
 from katana450.extensions.recording.datasets.sampling import RecordedStates
 from katana450.extensions.recording.files.recording_file import RecordingFile

@@ -28,11 +28,11 @@ from katana450.extensions.recording.files.simulation import (
     recorded_states,
 )
 from katana450.extensions.recording.messages import COMMANDS, STATE
-from katana450.extensions.recording.run_again.again_command import script_of_part
-from katana450.extensions.recording.run_again.again_script import (
+from katana450.extensions.recording.run_again import (
     RecordedPart,
     again_script,
     read_part,
+    script_of_part,
 )
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

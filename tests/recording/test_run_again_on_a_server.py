@@ -20,7 +20,7 @@ from katana450.client import RefusedError
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.playback.store import RecordingStore
-from katana450.extensions.recording.run_again.again_command import check_same_arm
+from katana450.extensions.recording.run_again import check_same_arm
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from katana450.server.service.identity import Identity

@@ -36,14 +36,16 @@ from katana450.extensions.recording.episodes.episode_folder import (
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.messages import EPISODES, nanoseconds
-from katana450.extensions.recording.scoring.score_command import is_best, score_file, shown
-from katana450.extensions.recording.scoring.scored import (
+from katana450.extensions.recording.scoring import (
     HIGHER_IS_BETTER,
     MEASURES,
     RATE,
     Scored,
     dimensionless_jerk,
+    is_best,
+    score_file,
     scored,
+    shown,
     sparc,
 )
 from katana450.maths.geometry.arrays import FloatArray

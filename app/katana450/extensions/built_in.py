@@ -91,7 +91,7 @@ EXTENSIONS = (
                 "score",
                 "measure and compare recordings",
                 f"{HERE}.recording.options:add_score_options",
-                f"{HERE}.recording.scoring.score_command:score_files",
+                f"{HERE}.recording.scoring:score_files",
             ),
         ),
         serve_options=f"{HERE}.recording.serve_parts:add_serve_options",

@@ -24,9 +24,8 @@ from katana450.extensions.recording.files.simulation import (
 )
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, PLANS, SOLIDS, TickMessage
-from katana450.extensions.recording.run_again.again_command import script_of_part
-from katana450.extensions.recording.scoring.score_command import score_file
-from katana450.extensions.recording.scoring.scored import Scored
+from katana450.extensions.recording.run_again import script_of_part
+from katana450.extensions.recording.scoring import Scored, score_file
 from katana450.extensions.recording.ticks import Verification
 from katana450.maths.geometry.arrays import FloatArray
 

@@ -126,7 +126,7 @@ def tick_sender(options: Namespace) -> TickSender | None:
 def record(options: Namespace) -> int:
     """Execute ``katana450 record``; return the exit status."""
     if options.act == "again":
-        from katana450.extensions.recording.run_again.again_command import again
+        from katana450.extensions.recording.run_again import again
 
         return again(options)
     from katana450.extensions.recording.files.record_command import record as keep

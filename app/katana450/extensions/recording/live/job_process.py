@@ -26,7 +26,7 @@ from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import session_for, verified
 from katana450.extensions.recording.files.trimming import keep, trim
 from katana450.extensions.recording.options import USED
-from katana450.extensions.recording.run_again.again_command import script_of_part
+from katana450.extensions.recording.run_again import script_of_part
 from katana450.platform_support import lower_priority
 
 FORMATS = {

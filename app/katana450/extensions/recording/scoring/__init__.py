@@ -1,1 +1,0 @@
-"""Measures of recordings, and tables and pages that compare them."""
