@@ -36,9 +36,7 @@ from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,
     EVENTS,
-    JOINT_STATES,
     STATE,
-    TF,
     TOPICS,
 )
 from katana450.maths.geometry import so3
@@ -74,7 +72,6 @@ def test_stock_reader_finds_every_message_valid_by_its_schema(
             counts[channel.topic] = counts.get(channel.topic, 0) + 1
     assert counts[COMMANDS] == len(records)
     assert counts[EVENTS] == len(records) // 100
-    assert {"foxglove.JointStates", "foxglove.FrameTransforms"} <= set(checks)
 
 
 def test_index_is_that_of_the_mcap_library(tmp_path: Path, file: RecordingFile) -> None:
@@ -175,20 +172,6 @@ def test_state_at_any_moment_has_all_objects(
                 assert known.joints == state.q.tolist()
                 assert {one.name for one in known.objects} == {o.name for o in state.objects}
     assert state_at(file, file.start - 1.0) is None
-
-
-def test_displays_get_joints_and_frames(file: RecordingFile, records: list[TickRecord]) -> None:
-    first = next(file.messages(JOINT_STATES))
-    names = [joint["name"] for joint in json.loads(first.data)["joints"]]
-    assert set(names) == set(described().robot.joints)
-    frames = json.loads(next(file.messages(TF)).data)["transforms"]
-    assert {frame["parent_frame_id"] for frame in frames} == {described().robot.links[0].name}
-    assert {"tcp", "object/cup"} <= {frame["child_frame_id"] for frame in frames}
-    *_, last = file.messages(JOINT_STATES)
-    values = {joint["name"]: joint["position"] for joint in json.loads(last.data)["joints"]}
-    state = next(record.state for record in records if abs(record.t - last.t) < 1e-6)
-    for name, value in described().robot.joint_values(state.q, state.gripper).items():
-        assert values[name] == pytest.approx(value, abs=1e-5)
 
 
 def test_metadata_and_attachments_tell_what_made_it(file: RecordingFile) -> None:

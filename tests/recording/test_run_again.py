@@ -25,7 +25,7 @@ from katana450.extensions.programs.steps.trajectory import CubicSpline
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import (
-    recorded_states,
+    simulated_states,
 )
 from katana450.extensions.recording.messages import COMMANDS, STATE
 from katana450.extensions.recording.run_again import (
@@ -132,7 +132,7 @@ def test_grasp_and_carried_object_are_repeated(tmp_path: Path) -> None:
     assert last.held is not None
     assert last.held.name == "cup"
     with RecordingFile.open(path) as file:
-        *_, recorded = recorded_states(file, described().session)
+        *_, recorded = simulated_states(file, described().session, -math.inf, math.inf)
     environment = described().session.environment
     places = [
         environment.pose(state.held, state.x_setpoint)[:3, 3]

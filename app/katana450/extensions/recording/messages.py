@@ -35,8 +35,6 @@ CHECKPOINTS: Final = "/checkpoints"
 PLANS: Final = "/plans"
 SOLIDS: Final = "/solids"
 STATE: Final = "/state"
-JOINT_STATES: Final = "/joint_states"
-TF: Final = "/tf"
 EVENTS: Final = "/events"
 EPISODES: Final = "/episodes"
 
@@ -213,57 +211,6 @@ class StateRow(msgspec.Struct, omit_defaults=True, kw_only=True):
             objects.pop(name, None)
 
 
-class TimeMessage(msgspec.Struct):
-    """Time in seconds and nanoseconds."""
-
-    sec: int
-    nsec: int
-
-
-class JointMessage(msgspec.Struct):
-    """Position of a joint of the URDF [rad or m]."""
-
-    name: str
-    position: float
-
-
-class JointStatesMessage(msgspec.Struct):
-    """Joints of the URDF."""
-
-    timestamp: TimeMessage
-    joints: list[JointMessage]
-
-
-class VectorMessage(msgspec.Struct):
-    """Vector [m]."""
-
-    x: float
-    y: float
-    z: float
-
-
-class QuaternionMessage(VectorMessage):
-    """Unit quaternion."""
-
-    w: float
-
-
-class TransformMessage(msgspec.Struct):
-    """Pose of a frame in its parent."""
-
-    timestamp: TimeMessage
-    parent_frame_id: str
-    child_frame_id: str
-    translation: VectorMessage
-    rotation: QuaternionMessage
-
-
-class TransformsMessage(msgspec.Struct):
-    """Frames of the tool and the objects."""
-
-    transforms: list[TransformMessage]
-
-
 class EventMessage(msgspec.Struct):
     """Something that happened, with further fields by its kind."""
 
@@ -302,8 +249,6 @@ TOPICS: Final = (
     Topic(PLANS, "katana450.Plan", SharedMessage),
     Topic(SOLIDS, "katana450.Solid", SharedMessage),
     Topic(STATE, "katana450.State", StateRow),
-    Topic(JOINT_STATES, "foxglove.JointStates", JointStatesMessage),
-    Topic(TF, "foxglove.FrameTransforms", TransformsMessage),
     Topic(EVENTS, "katana450.Event", EventMessage),
     Topic(EPISODES, "katana450.Episode", EpisodeMessage),
 )
@@ -311,8 +256,8 @@ TOPICS: Final = (
 
 
 DIGITS, SHOWN_DIGITS, RATE_DIGITS = 6, 5, 4
-"""Decimals [m, rad, 1] of poses, of what follows from other numbers or is only displayed, and of
-rates [rad/s, m/s] and the lean of water."""
+"""Decimals [m, rad, 1] of poses, of what follows from other numbers, and of rates
+[rad/s, m/s] and the lean of water."""
 
 NANO = 1_000_000_000
 
@@ -351,7 +296,6 @@ class StateMessages:
         ``environment`` gives the poses of objects in the hand. Without it they are left out.
         """
         self._robot, self._environment = robot, environment
-        self._root = robot.links[0].name
         self._poses: dict[str, ObjectPose] = {}
         self._objects: tuple[SceneObject, ...] | None = None
         self._tools: dict[int, tuple[State, FloatArray]] = {}
@@ -375,7 +319,7 @@ class StateMessages:
             q=[] if same else state.q.tolist(),
             setpoint=setpoint.tolist(),
             qd=_rounded(state.motion.qd, RATE_DIGITS),
-            # Its orientation follows from the joints, and displays get it by their topic.
+            # Its orientation follows from the joints.
             position=None if T is None else _point(T[:3, 3], SHOWN_DIGITS),
             target=_target(state),
             findings=[finding_text(finding) for finding in state.findings],
@@ -429,34 +373,6 @@ class StateMessages:
         """Describe all objects with the next state, also those that have not changed."""
         self._poses, self._objects = {}, None
 
-    def joint_states(self, state: State) -> JointStatesMessage:
-        """Return the message of the joints by their names in the URDF."""
-        values = self._robot.joint_values(state.q, state.gripper)
-        joints = [
-            JointMessage(name, round(value, SHOWN_DIGITS) + 0.0) for name, value in values.items()
-        ]
-        return JointStatesMessage(_time(state.t), joints)
-
-    def transforms(self, state: State, names: Iterable[str]) -> TransformsMessage:
-        """Return the message of the frames of the tool and of the objects ``names``."""
-        T = self.tool_pose(state)
-        poses = [] if T is None else [(state.tool, *pose_of(T))]
-        for name in names:
-            pose = self._poses[name]
-            poses.append((f"object/{name}", pose.position, pose.orientation))
-        return TransformsMessage(
-            [
-                TransformMessage(
-                    _time(state.t),
-                    self._root,
-                    name,
-                    VectorMessage(*(round(x, SHOWN_DIGITS) for x in position)),
-                    QuaternionMessage(*(round(x, SHOWN_DIGITS) for x in orientation)),
-                )
-                for name, position, orientation in poses
-            ]
-        )
-
 
 def _water(water: Water) -> WaterMessage:
     """Return the volumes, the surfaces in the vessels, and the water that left them in this tick.
@@ -495,7 +411,3 @@ def _target(state: State) -> TargetMessage:
             return TargetMessage(position=position.tolist(), pitch=pitch, roll=roll)
         case PoseTarget(T=T) | ToolTarget(T=T):
             return TargetMessage(T=[_rounded(row, DIGITS) for row in T])
-
-
-def _time(t: float) -> TimeMessage:
-    return TimeMessage(*divmod(nanoseconds(t), NANO))

@@ -35,8 +35,8 @@ from katana450.extensions.recording.episodes.episode_folder import shown_part
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import (
     check_whole,
-    recorded_states,
     session_for,
+    simulated_states,
 )
 from katana450.extensions.recording.files.table import columns
 from katana450.maths.collision.clearance import MIN_CLEARANCE
@@ -183,7 +183,9 @@ def scored(
     first, last = file.start + start, min(file.start + end, file.end)
     check_whole(file, first, last)
     session = robot.session
-    states = list(recorded_states(file, session, first, last))
+    states = list(simulated_states(file, session, first, last))
+    # The last one before the part is its first.
+    states = states[max(sum(state.t <= first for state in states) - 1, 0) :]
     _check_same(file, states, first, last)
     moving = _moving(states)
     if moving is None:

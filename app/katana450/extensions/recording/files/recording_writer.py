@@ -9,7 +9,6 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 import zstandard
@@ -52,10 +51,8 @@ from katana450.extensions.recording.messages import (
     COMMANDS,
     EPISODES,
     EVENTS,
-    JOINT_STATES,
     SHARED_TOPICS,
     STATE,
-    TF,
     TOPICS,
     CheckpointMessage,
     StateMessages,
@@ -263,21 +260,6 @@ class MessageWriter:
 CHECKPOINT_PERIOD = 10.0
 """[s] Time between two complete states: a simulation from one to any moment takes a second."""
 
-SHOWN_PERIOD = 0.125
-"""[s] Minimum time between two messages that only displays read."""
-
-
-@dataclass
-class _Written:
-    """Part of the states that has been written so far."""
-
-    content: bytes = b""
-    t: float | None = None
-    checkpoint_t: float | None = None
-    shown_t: float = float("-inf")
-    shown: bool = True
-    moved: set[str] = field(default_factory=set)
-
 
 class RecordingWriter:
     """Writes the ticks of one session to a file. For use in one thread.
@@ -291,7 +273,10 @@ class RecordingWriter:
         self._codec, self._digester = Codec(), Digester()
         self._messages = StateMessages(header.robot, header.environment)
         self._number = 0
-        self._written = _Written()
+        # Content and time of the newest state, and time of the newest complete one [s].
+        self._content = b""
+        self._t: float | None = None
+        self._checkpoint_t: float | None = None
         self._scripts: set[tuple[str, float, bool]] = set()
         file.flush()
 
@@ -304,35 +289,33 @@ class RecordingWriter:
 
         A tick with a value that has no form is written as missing, with the reason.
         """
-        record, written = without_identities(record), self._written
+        record = without_identities(record)
         state, t = record.state, record.t
         self._number += 1
         try:
             content = self._digester.content(state)
             digest = self._digester.digest(state, content)
-            form = tick_message(self._codec, record, written.t, digest)
+            form = tick_message(self._codec, record, self._t, digest)
         except FormError as error:
-            written.checkpoint_t = written.t = None
+            self._checkpoint_t = self._t = None
             self._add(COMMANDS, t, TickMessage(t, missing=str(error)))
             return
         self._add_shared(t)
         self._add(COMMANDS, t, form)
-        written.t = state.t
-        due = written.checkpoint_t is None or t - written.checkpoint_t >= CHECKPOINT_PERIOD
+        self._t = state.t
+        due = self._checkpoint_t is None or t - self._checkpoint_t >= CHECKPOINT_PERIOD
         if due:
             self._messages.describe_all()
-        if due or content != written.content:
-            written.content = content
-            self._add_state(t, state)
-        if not written.shown and t - written.shown_t >= SHOWN_PERIOD:
-            self._add_shown(t, state)
+        if due or content != self._content:
+            self._content = content
+            self._add(STATE, t, self._messages.state(state))
         if due:
             self._add_checkpoint(t, state)
 
     def lost(self, t: float, ticks: int, why: str) -> None:
         """Record that ``ticks`` ticks until ``t`` [s] were lost, for the reason ``why``."""
         self._number += ticks
-        self._written.checkpoint_t = self._written.t = None
+        self._checkpoint_t = self._t = None
         self._add(COMMANDS, t, TickMessage(t, missing=why, ticks=ticks))
 
     def event(self, t: float, kind: str, what: Mapping[str, Any]) -> None:
@@ -374,20 +357,6 @@ class RecordingWriter:
             data = b'{"key":"%b","value":%b}' % (key.encode(), text)
             self._writer.add(SHARED_TOPICS[kind], self._number, log_time, data)
 
-    def _add_state(self, t: float, state: State) -> None:
-        message = self._messages.state(state)
-        self._add(STATE, t, message)
-        self._written.shown = False
-        self._written.moved.update(pose.name for pose in message.objects)
-        self._written.moved.difference_update(message.removed)
-
-    def _add_shown(self, t: float, state: State) -> None:
-        """Write the messages that displays read."""
-        self._add(JOINT_STATES, t, self._messages.joint_states(state))
-        self._add(TF, t, self._messages.transforms(state, sorted(self._written.moved)))
-        self._written.shown, self._written.shown_t = True, t
-        self._written.moved.clear()
-
     def _add_checkpoint(self, t: float, state: State) -> None:
         try:
             form = self._codec.encoded(state)
@@ -396,4 +365,4 @@ class RecordingWriter:
             return
         self._add_shared(t)
         self._add(CHECKPOINTS, t, CheckpointMessage(t, form))
-        self._written.checkpoint_t = t
+        self._checkpoint_t = t

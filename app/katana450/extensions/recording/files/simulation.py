@@ -330,23 +330,3 @@ def simulated_states(
                 continue
         if lost is not None:
             lost(missing)
-
-
-def recorded_states(
-    file: RecordingFile, session: Session, start: float = -math.inf, end: float = math.inf
-) -> Iterator[State]:
-    """Yield the states from ``start`` to ``end`` [s], on the clock of the recording.
-
-    The last state before ``start`` comes first. Raises InputError as ``simulated_states``.
-    """
-    waiting: State | None = None
-    for state in simulated_states(file, session, start, end):
-        if state.t <= start:
-            waiting = state
-            continue
-        if waiting is not None:
-            yield waiting
-            waiting = None
-        yield state
-    if waiting is not None:
-        yield waiting

@@ -28,18 +28,16 @@ from katana450.extensions.recording.messages import (
     COMMANDS,
     EPISODES,
     EVENTS,
-    JOINT_STATES,
     PLANS,
     SOLIDS,
     STATE,
-    TF,
     nanoseconds,
 )
 
 KEY = re.compile(rb'"([0-9a-f]{32})"')
 """Pattern of the keys of shared values in messages."""
 
-SHOWN = (JOINT_STATES, TF, EVENTS, EPISODES)
+PART_TOPICS = (EVENTS, EPISODES)
 """Topics of which only the messages in the part are kept."""
 
 CHUNK_SECONDS = 1.0
@@ -151,9 +149,9 @@ def _write(
         if run.start < start:
             copy.copy(Message(EVENTS, 0, nanoseconds(start), begun_before(run, start)))
     number = 0
-    topics = COMMANDS, CHECKPOINTS, STATE, *SHOWN
+    topics = COMMANDS, CHECKPOINTS, STATE, *PART_TOPICS
     for message in _simulated(files, topics, start if begin is None else min(begin, start), end):
-        if message.topic in SHOWN and message.log_time < nanoseconds_of(start):
+        if message.topic in PART_TOPICS and message.log_time < nanoseconds_of(start):
             continue
         number = message.number
         if episode is None or message.topic != EPISODES:
