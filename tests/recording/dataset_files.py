@@ -15,6 +15,7 @@ from tests.recording.recorded import Commands, random_commands, record
 BEGIN = 0.25
 """[s] Start of the episodes after that of their recordings."""
 
+# Recordings of earlier versions have a key of the giver.
 BY = {"name": "Ada", "role": "operator", "key": "0a1b2c3d4e5f"}
 
 

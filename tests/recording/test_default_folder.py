@@ -2,49 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import sys
-from functools import partial
 from pathlib import Path
 
 import pytest
 
-import katana450
-from katana450.extensions.recording.folders import (
-    default_episodes_folder,
-    default_folder,
-    recordings_in,
-)
-from katana450.platform_support import cache_folder
-from tests.browser.server import RECORDING_APP, AppServer
-from tests.waiting import until
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="XDG_STATE_HOME")
-@pytest.mark.parametrize("named", [True, pytest.param(False, marks=pytest.mark.long)])
-def test_server_records_where_its_start_says(tmp_path: Path, named: bool) -> None:
-    environment = {
-        **os.environ,
-        "HOME": str(tmp_path),
-        "XDG_CACHE_HOME": str(cache_folder()),
-    }
-    environment.pop("XDG_STATE_HOME", None)
-    state = tmp_path / ".local" / "state"
-    if named:
-        state = tmp_path / "named"
-        environment["XDG_STATE_HOME"] = str(state)
-    with AppServer(RECORDING_APP, environment=environment) as server:
-        folder = state / "katana450" / "recordings" / f"port-{server.port}"
-        episodes = state / "katana450" / "episodes" / f"port-{server.port}"
-        assert f"are kept in {folder}, episodes in {episodes}" in server.output
-        with katana450.connect(server.url, name="Ada") as client:
-            client.joints((0.2, -1.0, 1.4, 0.3, 0.0))
-            client.joints((0.0, -1.0, 1.4, 0.3, 0.0))
-            until(partial(recordings_in, folder))
-    (path,) = recordings_in(folder)
-    assert katana450.open(path).verify().ticks > 50
-    assert folder.stat().st_mode & 0o077 == 0
-    assert episodes.is_dir()
+from katana450.extensions.recording.folders import default_episodes_folder, default_folder
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,10 @@ import errno
 import json
 import os
 import shutil
+import threading
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mcap.reader import make_reader
 from msgspec import structs
 
@@ -22,11 +21,10 @@ from katana450.extensions.recording.episodes.episode import (
     Episode,
     EpisodeOutcome,
     episode_of,
-    episodes_of,
-    message_of,
 )
 from katana450.extensions.recording.episodes.episode_folder import (
     EpisodeFolder,
+    EpisodeMarker,
     episode_files,
     only_episode,
     with_episode,
@@ -35,7 +33,6 @@ from katana450.extensions.recording.episodes.episode_folder import (
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import session_for, verify_recording
-from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.live import ring as ring_module
 from katana450.extensions.recording.messages import EPISODES, STATE
 from katana450.server.api.episode_requests import episode_request
@@ -105,29 +102,6 @@ def test_episode_without_motion_in_its_time_is_refused(recorded: Path, tmp_path:
     with pytest.raises(InputError, match="There is nothing"):
         write_episode([recorded], tmp_path / "x.mcap", attempt(recorded, start=1.0, end=2.0))
     assert not list(tmp_path.iterdir())
-
-
-texts = st.text(max_size=20)
-outcomes = st.sampled_from([end for end in EpisodeOutcome if end is not EpisodeOutcome.RUNNING])
-episodes = st.builds(
-    lambda number, task, begin, length, outcome, note: Episode(
-        number, task, begin, begin + length, outcome, note, ADA
-    ),
-    st.integers(1, 5),
-    texts,
-    st.floats(-1e6, 1e6),
-    st.floats(0, 1e4),
-    outcomes,
-    texts,
-)
-
-
-@settings(max_examples=30)
-@given(st.lists(episodes, max_size=12))
-def test_last_description_of_each_number_counts(described: list[Episode]) -> None:
-    messages = [json_text(message_of(episode, 0.0, "judged")) for episode in described]
-    last = {episode.number: episode for episode in described}
-    assert episodes_of(messages) == tuple(last[number] for number in sorted(last))
 
 
 DESCRIBED = '{"number": 1, "task": "", "note": "", "by": {}, "end": null, "outcome": %s}'
@@ -386,3 +360,50 @@ def test_folder_lists_files_only(bench: Bench, recorded: Path) -> None:
     assert bench.folder.next_number() == 9
     os.remove(folder / "episode-0001.mcap")
     assert [entry.path.name for entry in bench.folder.kept()] == ["episode-0007.mcap"]
+
+
+def test_interrupted_episode_waits_until_its_ring_is_found(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    away = bench.ring_folder.with_name("away")
+    monkeypatch.chdir(bench.ring_folder.parent)
+    bench.ring_folder = Path("ring")
+    bench.keeper = bench.made()
+    bench.ask(do="start", task="stir")
+    bench.move(100)
+    bench.ring.sync()
+    monkeypatch.chdir("/")
+    away.with_name("ring").rename(away)
+    assert "There is no folder" in bench.made().status()["notice"]
+    assert len(bench.folder.markers()) == 1
+    away.rename(away.with_name("ring"))
+    bench.keeper = bench.made()
+    assert "is kept as unfinished" in bench.keeper.status()["notice"]
+    assert not bench.folder.markers()
+
+
+def test_end_of_an_interrupted_episode_keeps_the_files_of_a_new_one(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.move(50)
+    read, reading, may_end = bench.folder.markers, threading.Event(), threading.Event()
+
+    def slowly() -> list[EpisodeMarker]:
+        result = read()
+        if threading.current_thread() is finishing:
+            reading.set()
+            assert may_end.wait(5.0)
+        return result
+
+    monkeypatch.setattr(bench.folder, "markers", slowly)
+    # As the thread that finishes interrupted episodes.
+    finishing = threading.Thread(target=bench.keeper._running.hold_needed)
+    starting = threading.Thread(target=lambda: bench.ask(do="start", task="stir"))
+    finishing.start()
+    assert reading.wait(5.0)
+    starting.start()
+    starting.join(0.2)
+    may_end.set()
+    finishing.join()
+    starting.join()
+    assert bench.ring.held == bench.ring.newest

@@ -64,26 +64,20 @@ def bell(seconds: float) -> FloatArray:
     return np.stack((0.6 * speed, 0.0 * speed, 0.8 * speed), axis=1)
 
 
-def test_minimum_jerk_has_the_known_smoothness() -> None:
+def test_smoothness_is_the_known_one_and_falls_with_each_stop() -> None:
     """720 by Hogan and Sternad (2009), -1.41 by Balasubramanian and others (2015)."""
     for seconds in (2.0, 4.0):
         velocity = bell(seconds)
         assert dimensionless_jerk(velocity) == pytest.approx(720.0, rel=0.05)
         assert sparc(np.linalg.norm(velocity, axis=1)) == pytest.approx(-1.41, abs=0.01)
-
-
-def test_smoothness_does_not_depend_on_size_and_falls_with_each_stop() -> None:
+    # The middle half of such a motion, without a step at its ends: 275.6 / 32 / 0.793^2.
+    assert dimensionless_jerk(bell(4.0)[100:301]) == pytest.approx(13.7, rel=0.05)
     one = bell(2.0)
     assert dimensionless_jerk(3.0 * one) == pytest.approx(dimensionless_jerk(one), rel=1e-9)
     assert sparc(3.0 * one[:, 0]) == pytest.approx(sparc(one[:, 0]), rel=1e-9)
     two, three = np.concatenate((one, one)), np.concatenate((one, one, one))
     assert dimensionless_jerk(one) < dimensionless_jerk(two) < dimensionless_jerk(three)
     assert sparc(one[:, 0]) > sparc(two[:, 0]) > sparc(three[:, 0])
-
-
-def test_part_of_a_motion_has_no_step_at_its_ends() -> None:
-    """The middle half of a minimum-jerk motion: 275.6 / 32 / 0.793^2 by integration."""
-    assert dimensionless_jerk(bell(4.0)[100:301]) == pytest.approx(13.7, rel=0.05)
 
 
 @pytest.fixture(scope="module")
