@@ -270,7 +270,7 @@ def test_ticks_of_a_failed_sync_are_counted_and_not_there_twice(folder: Path) ->
     assert times == [record.t for record in (*records[1:100], *records[220:260])]
     result = katana450.open(joined).verify()
     assert result.identical
-    assert result.unknown == 121
+    assert result.unknown == 120
 
 
 def content_of_ticks(path: Path) -> tuple[list[tuple[int, str]], list[float]]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import secrets
+import shutil
+import weakref
 from collections import OrderedDict
 from pathlib import Path
-from tempfile import TemporaryDirectory, mkdtemp
+from tempfile import mkdtemp
 
 from katana450.errors import InputError
 from katana450.extensions.recording.folders import SUFFIX, recordings_in
@@ -34,7 +36,8 @@ class RecordingStore:
     def __init__(self, ring: Path | None) -> None:
         """Offer the ring in the folder ``ring``, if there is one."""
         self.ring = ring
-        self._temporary = TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True)
+        self._temporary = Path(mkdtemp(prefix=PREFIX))
+        weakref.finalize(self, shutil.rmtree, self._temporary, ignore_errors=True)
         self._ring = None if ring is None else PlaybackRun(lambda: recordings_in(ring))
         self._files: OrderedDict[str, tuple[Path, OpenedRun]] = OrderedDict()
 
@@ -55,11 +58,11 @@ class RecordingStore:
 
     def new_path(self) -> Path:
         """Return the path for a file that is being received."""
-        return Path(self._temporary.name) / f"{secrets.token_hex(8)}{SUFFIX}"
+        return self._temporary / f"{secrets.token_hex(8)}{SUFFIX}"
 
     def new_folder(self) -> Path:
         """Return a new folder for a file that is being made."""
-        return Path(mkdtemp(dir=self._temporary.name))
+        return Path(mkdtemp(dir=self._temporary))
 
     def add(self, path: Path, run: OpenedRun) -> str:
         """Keep ``run`` of the file ``path``, and return its name."""
