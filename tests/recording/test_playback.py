@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,15 +33,19 @@ from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
 from katana450.extensions.recording.files import recording_file
 from katana450.extensions.recording.files.recording_file import (
+    Message,
     RecordingFile,
     checked_size,
     utc_offset_ns,
 )
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.folders import recordings_in
+from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.live.ring import Ring
+from katana450.extensions.recording.messages import EVENTS
 from katana450.extensions.recording.playback import opened_run
 from katana450.extensions.recording.playback import run as run_module
+from katana450.extensions.recording.playback.marks import Mark, add_marks
 from katana450.extensions.recording.playback.routes import PlaybackRoutes, difference
 from katana450.extensions.recording.playback.rows import still_flying
 from katana450.extensions.recording.playback.run import (
@@ -239,6 +244,43 @@ def test_marks_tell_stops_drivers_and_plans(tmp_path: Path) -> None:
     moment = played.at(stop.t + 1e-6)
     assert moment is not None
     assert moment.row.status == "stopped"
+
+
+def event(t: int, **form: Any) -> Message:
+    return Message(EVENTS, t, t * 10**9, json_text({"t": float(t), **form}))
+
+
+def test_name_that_comes_after_the_press_is_that_of_the_stop() -> None:
+    stop, named = "Somebody pressed STOP.", "Window 2 pressed STOP."
+    marks: list[Mark] = []
+    # The name can be in a later part of the file, which is read when it is complete.
+    add_marks(marks, [event(1, kind="stop", why=stop), event(2, kind="driver", name="Anna")])
+    assert [mark.text for mark in marks] == [stop, "Anna drives"]
+    add_marks(marks, [event(3, kind="stop", why=named, named=True)])
+    assert marks == [Mark(1.0, "stop", named), Mark(2.0, "driver", "Anna drives")]
+    # A recording that begins in between does not show the press.
+    later: list[Mark] = []
+    add_marks(later, [event(3, kind="stop", why=named, named=True)])
+    assert later == []
+
+
+def test_program_is_marked_at_its_begin_and_its_end() -> None:
+    marks: list[Mark] = []
+    run = {"kind": "program", "name": "Pour", "since": 5.0}
+    add_marks(
+        marks,
+        [
+            event(5, **run, began=True),
+            # The program drives by its own name, which the mark before says.
+            event(6, kind="driver", name="Pour", channel="program"),
+            # The next file says that it runs.
+            event(19, **run, began=True),
+            event(38, **run, began=False),
+        ],
+    )
+    assert [(mark.t, mark.text) for mark in marks] == [
+        (5.0, "Script Pour begins"), (38.0, "Script Pour ends after 33 s")
+    ]  # fmt: skip
 
 
 def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
