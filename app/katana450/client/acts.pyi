@@ -433,15 +433,8 @@ class EpisodeActs:
             number: The episode.
         """
 
-    def undo(self, number: int | None = ...) -> int:
-        """Undo the last judgement, discard or re-record, up to 10 s after it.
-
-        Args:
-            number: The episode; what was done to another one since is not undone. None for any.
-        """
-
     def rerecord(self, number: int | None = ...) -> int:
-        """Begin an episode again. When the new one is kept, the old one is discarded.
+        """Discard an episode, and begin another one with the same task.
 
         Args:
             number: The old episode; None for the one that runs, or else the last one. One that runs is
