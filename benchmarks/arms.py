@@ -22,8 +22,8 @@ import numpy as np
 import katana450
 from benchmarks import kinematics_report as report
 from benchmarks.kinematics import ROOT
+from katana450.arm.control.arm import NO_GRIPPER
 from katana450.arm.control.commands.tool_commands import Position
-from katana450.arm.control.objects.gripper_model import NO_GRIPPER
 from katana450.extensions.gallery.arms_command import file_of, robot_named
 from katana450.extensions.programs.run.simulation import plan_script
 from katana450.extensions.programs.script.script import parse

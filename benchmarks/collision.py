@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from katana450.arm.control.state.state import Status
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.loader import load
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.collision.clearance import advance
 from katana450.maths.collision.shape import half_space

@@ -27,7 +27,7 @@ import msgspec
 import numpy as np
 from websockets.exceptions import ConnectionClosed
 
-from katana450.arm.runtime.loop_timing import TIMED_TICKS
+from katana450.arm.runtime.pipes.state_publisher import TIMED_TICKS
 from katana450.client import AsyncClient, aconnect
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests

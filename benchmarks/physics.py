@@ -22,8 +22,7 @@ from katana450.maths.collision.shape import box, half_space
 from katana450.maths.collision.world import obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import frozen
-from katana450.maths.physics.body import RigidBody
-from katana450.maths.physics.model import STEP, compile_model
+from katana450.maths.physics.model import STEP, RigidBody, compile_model
 from katana450.maths.physics.simulation import BodySimulation
 
 TICK, SIDE, GAP = 0.01, 0.04, 0.04

@@ -52,7 +52,7 @@ const bar = new Bar(page, stopPress, withNames);
 /** @type {Parts} */
 const parts = new Parts(page, frame, (hz) => send({ watch: hz }));
 const sheets = new Sheets(page, parts);
-const key = keyHandler(page, parts, stop);
+const key = keyHandler(parts, stop);
 
 function stop() {
   stopPress.send();

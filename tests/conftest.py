@@ -18,8 +18,8 @@ import pytest
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.loader import load
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.settings import Settings
 from tests.schedule import Completeness, LowestPriority, Schedule

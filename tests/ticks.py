@@ -9,12 +9,13 @@ from itertools import islice
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
+from katana450.arm.runtime.clock import MonotonicClock
 
 TICK = 0.01
 """[s]"""
 
 
-class SteppedClock:
+class SteppedClock(MonotonicClock):
     """A clock that advances when a loop sleeps, and when the test sets it."""
 
     def __init__(self, t: float = 100.0) -> None:
@@ -23,7 +24,7 @@ class SteppedClock:
     def now(self) -> float:
         return self.t
 
-    def sleep_until(self, t: float, _wake: threading.Event | None = None) -> None:
+    def sleep_until(self, t: float, wake: threading.Event | None = None) -> None:  # noqa: ARG002
         self.t = max(self.t, t)
 
 

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 from katana450.lazy_names import loaded, modules_of
 
 if TYPE_CHECKING:
-    from katana450.arm.control.actor import Actor as Actor
     from katana450.arm.control.commands import commands as commands
     from katana450.arm.control.commands.act import Command as Command
     from katana450.arm.control.commands.act import MotionRequest as MotionRequest
     from katana450.arm.control.commands.act import Request as Request
     from katana450.arm.control.commands.act import Traits as Traits
+    from katana450.arm.control.lease import Actor as Actor
     from katana450.arm.control.lease import Person as Person
     from katana450.arm.control.lease import Role as Role
     from katana450.arm.control.session.session import Session as Session
-    from katana450.arm.control.session.silence import SilenceProfile as SilenceProfile
+    from katana450.arm.control.session.stopping import SilenceProfile as SilenceProfile
     from katana450.arm.control.state.arm_report import ArmReport as ArmReport
     from katana450.arm.control.state.state import Finding as Finding
     from katana450.arm.control.state.state import Reason as Reason
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from katana450.arm.control.state.state import Status as Status
     from katana450.arm.drivers.driver import Driver as Driver
     from katana450.arm.drivers.driver import DriverAnswer as DriverAnswer
-    from katana450.arm.robot.initial_scene import InitialScene as InitialScene
+    from katana450.arm.robot.object_meshes import InitialScene as InitialScene
     from katana450.arm.robot.robot import Robot as Robot
     from katana450.errors import ConfigurationError as ConfigurationError
     from katana450.errors import InputError as InputError

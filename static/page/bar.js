@@ -19,11 +19,6 @@ const hide = (id, hidden) => (element(id, HTMLElement).hidden = hidden);
 /** @param {number} seconds */
 const time = (seconds) => clock(new Date(1000 * seconds));
 
-/** Whether this window may take the detour that the arm offers. @param {Page.Store} store */
-export function mayGo({ live }) {
-  return Boolean(live?.detour) && live?.role !== "viewer" && (live?.mine || live?.holder === null);
-}
-
 /** The last words of a headline, its `end`, are never cut. @param {string} words */
 function head(words, end = "") {
   const cut = [words.slice(0, words.length - end.length).trimEnd(), end];
@@ -51,7 +46,6 @@ export class Bar {
     this.#page = page;
     this.#stop = stop;
     this.#named = named;
-    element("go", HTMLButtonElement).addEventListener("click", () => page.say({ do: "go" }));
     clear.addEventListener("click", () => page.say({ do: "clear_stop" }));
     const mode = element("mode", HTMLElement);
     // What is cut there is whole in a message.
@@ -72,7 +66,6 @@ export class Bar {
     clear.hidden = !status.stopped || !status.may_clear_stop;
     clear.disabled = status.wait !== "";
     clear.title = status.wait;
-    hide("go", !mayGo(store));
     this.#drawLease(status);
     this.#drawOrders(status);
     Pace.draw(store.live);
@@ -131,7 +124,6 @@ export class Bar {
     const { status, proven } = this.#page.store;
     if (!status) return;
     body.dataset.mood = proven ? "stopped" : "starting";
-    hide("go", true);
     offer(false);
     text("holder", "Driver unknown");
     Pace.draw(null);

@@ -2,28 +2,22 @@
 import { closest, element, matches } from "../dom.js";
 import * as Edit from "../edit.js";
 import * as Jog from "../jog.js";
-import { mayGo } from "./bar.js";
 
-const PRESSED = "button, a, input, select, textarea, summary, [role=button]"; // what Enter acts on by itself
 // What Space types into: text, but neither a number nor the search in a list, which keeps the focus after a choice.
 const TEXT = "textarea, input:is(:not([type]), [type=text]):not([readonly], [inputmode], [aria-haspopup])";
 const TYPED = "input:not([type=range], [type=radio], [type=checkbox]), textarea, select"; // what takes letters
 
 /**
  * Returns the function for each key event. Space, except in a text, and Esc only stop the arm, whatever has the focus.
- * @param {Page.Context} page @param {import("./parts.js").Parts} parts @param {() => void} stop
+ * @param {import("./parts.js").Parts} parts @param {() => void} stop
  */
-export function keyHandler({ store, say }, parts, stop) {
+export function keyHandler(parts, stop) {
   /** Act on an event of a key that is no STOP; return whether it was handled. @param {KeyboardEvent} event */
   function act(event) {
     const { target, key, repeat } = event;
     const down = event.type === "keydown";
     // A key that stays pressed is one click.
     if (key === "Enter" && repeat && closest(target, "button")) return true;
-    if (key === "Enter" && down && mayGo(store) && !closest(target, PRESSED)) {
-      if (!repeat) say({ do: "go" });
-      return true;
-    }
     if (matches(target, TYPED)) return false;
     if (key === "?" && down) {
       if (!repeat) element("help-button", HTMLButtonElement).click();

@@ -14,7 +14,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.view import GHOST_COLOURS
 from tests.browser.page import ViserPage
-from tests.browser.session import AXES, Truth, bar, go_home, mood
+from tests.browser.session import AXES, Truth, go_home
 
 MOVE, PITCH = "/target/move", "/target/move/pitch"
 
@@ -204,28 +204,3 @@ def test_typed_pose_reports_the_impossible_yaw(robot: Robot) -> None:
     # The tool's x axis leaves the arm's plane by asin(cos 30 sin 23).
     off = math.degrees(math.asin(math.cos(math.radians(30.0)) * math.sin(math.radians(23.0))))
     assert f"{off:.0f}° off" in robot.text()
-
-
-@pytest.mark.long
-def test_detour_is_offered_in_the_sentence_and_taken_by_enter_or_go(
-    page: ViserPage, truth: Truth, artefacts: Path
-) -> None:
-    go = page.page.locator("#go")
-    for taken_by in ("Enter", "Go"):
-        # Lift the tool by 20 cm and pull it back over the shoulder, where limits hold it.
-        page.drag_arrow(MOVE, "z", 0.2)
-        page.wait_until(lambda: mood(page.page) == "limited", "the limit")
-        page.settled(lambda: page.node_pose(MOVE), "the handle")
-        page.drag_arrow(MOVE, "x", -0.45)
-        page.wait_until(go.is_visible, "the offer", seconds=20.0)
-        assert "s detour" in bar(page, "why")
-        assert "press Enter or Go" in bar(page, "why")
-        page.keep(artefacts / f"detour-{taken_by}.png")
-        if taken_by == "Enter":
-            page.page.keyboard.press("Enter")
-        else:
-            go.click()
-        page.wait_until(go.is_hidden, "the detour")
-        page.wait_until(lambda: mood(page.page) in ("ok", "limited"), "the arrival", seconds=20.0)
-        assert "would have to leap" not in bar(page, "why")
-        go_home(page, truth)

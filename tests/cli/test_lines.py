@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from tests.cli.lines import ask
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.collision.shape import half_space
 from katana450.maths.collision.world import CollisionWorld, obstacle

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.maths.collision.clearance import (
     MAX_UNCHECKED_PATH,
     MIN_CLEARANCE,

@@ -13,8 +13,7 @@ import pytest
 
 from katana450.errors import InputError
 from katana450.maths.collision import engine
-from katana450.maths.collision.contact import Witness
-from katana450.maths.collision.engine import distance, hull_triangles, witness
+from katana450.maths.collision.engine import Witness, distance, hull_triangles, witness
 from katana450.maths.collision.linkage import Linkage, RigidGroup
 from katana450.maths.collision.shape import (
     CollisionShape,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +11,17 @@ import pytest
 import trimesh
 import yourdfpy
 
-from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.conduit.rings import PROFILE, SIDES, poses, ring
-from katana450.extensions.conduit.stretches import CONDUITS, ConduitStretch, stretches_of
+from katana450.extensions.conduit import (
+    CONDUITS,
+    PROFILE,
+    SIDES,
+    ConduitStretch,
+    poses,
+    ring,
+    stretches_of,
+)
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
@@ -136,65 +143,42 @@ def test_a_rib_is_a_closed_band_seen_from_outside() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    "change",
     [
-        ("nonsense", "Expecting value"),
-        ("{}", "conduits"),
-        ('{"conduits": [{}]}', "ends"),
-        ('{"conduits": 3}', "not iterable"),
+        {"radius": -1.0}, {"length": float("inf")}, {"radius": "thick"}, {"ends": []},
+        {"ends": [{"link": "nowhere"}] * 2}, None,
     ],
-)
-def test_a_broken_file_is_refused(tmp_path: Path, text: str, message: str) -> None:
-    urdf = tmp_path / URDF_PATH.name
-    urdf.write_bytes(URDF_PATH.read_bytes())
-    (tmp_path / CONDUITS).write_text(text, encoding="utf-8")
-    with pytest.raises(RobotDescriptionError, match=message) as refused:
-        stretches_of(load(urdf))
-    assert CONDUITS in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"radius": -1.0}, "radius -1.0 m"),
-        ({"length": float("inf")}, "length inf m"),
-        ({"radius": "thick"}, "could not convert"),
-        ({"ends": []}, "not enough values"),
-    ],
-)
-def test_a_conduit_with_invalid_values_is_refused(
-    tmp_path: Path, change: dict[str, object], message: str
+)  # fmt: skip
+def test_a_broken_file_is_refused(
+    robot: Robot, tmp_path: Path, change: dict[str, object] | None
 ) -> None:
     described = json.loads((URDF_PATH.parent / CONDUITS).read_text(encoding="utf-8"))
-    described["conduits"][0].update(change)
-    urdf = tmp_path / URDF_PATH.name
-    urdf.write_bytes(URDF_PATH.read_bytes())
-    (tmp_path / CONDUITS).write_text(json.dumps(described), encoding="utf-8")
-    with pytest.raises(RobotDescriptionError, match=message):
-        stretches_of(load(urdf))
+    described["conduits"][0].update(change or {})
+    text = "nonsense" if change is None else json.dumps(described)
+    (tmp_path / CONDUITS).write_text(text, encoding="utf-8")
+    with pytest.raises(RobotDescriptionError, match=CONDUITS):
+        stretches_of(replace(robot, path=tmp_path / URDF_PATH.name))
 
 
 @pytest.mark.parametrize(
-    ("start", "end", "message"),
+    ("start", "end"),
     [
-        ("arm_base_link", "upper_arm_link", "2 driven joints"),
-        ("upper_arm_link", "pan_link", "is not a descendant of"),
-        ("roll_link", "flange", "0 driven joints"),
-        ("nowhere", "wrist_link", "is not a descendant of"),
-        ("arm_base_link", "nowhere", "nowhere"),
+        ("arm_base_link", "upper_arm_link"),
+        ("upper_arm_link", "pan_link"),
+        ("roll_link", "flange"),
+        ("nowhere", "wrist_link"),
+        ("arm_base_link", "nowhere"),
     ],
 )
 def test_ends_on_links_without_one_joint_between_are_refused(
-    tmp_path: Path, start: str, end: str, message: str
+    robot: Robot, tmp_path: Path, start: str, end: str
 ) -> None:
     described = json.loads((URDF_PATH.parent / CONDUITS).read_text(encoding="utf-8"))
     for one, link in zip(described["conduits"][0]["ends"], (start, end), strict=True):
         one["link"] = link
-    urdf = tmp_path / URDF_PATH.name
-    urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(json.dumps(described), encoding="utf-8")
-    with pytest.raises(RobotDescriptionError, match=message):
-        stretches_of(load(urdf))
+    with pytest.raises(RobotDescriptionError, match=CONDUITS):
+        stretches_of(replace(robot, path=tmp_path / URDF_PATH.name))
 
 
 @pytest.mark.parametrize("number", range(4))

@@ -10,13 +10,19 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
+from katana450.arm.control.arm import JointSet
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.joints import JointSet
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.stopping import clear_refusal
 from katana450.arm.control.session.transitions import TABLE, Effect, effect_of
-from katana450.arm.control.state.following import Following
-from katana450.arm.control.state.modes import Idle, Jogging, Leaving, Positioning, Servoing
+from katana450.arm.control.state.modes import (
+    Following,
+    Idle,
+    Jogging,
+    Leaving,
+    Positioning,
+    Servoing,
+)
 from katana450.arm.control.state.state import Reason, State
 from katana450.assembly.robot_session import describe_robot
 from katana450.maths.geometry.arrays import FloatArray
@@ -267,7 +273,7 @@ class JointRules(RuleBasedStateMachine):
         if along is not None:
             np.testing.assert_allclose(state.setpoint, along.motion().q, rtol=0, atol=1e-9)
         if isinstance(state.mode, Following):
-            np.testing.assert_allclose(state.goal, state.mode.goal, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(state.goal, state.mode.plan.end, rtol=0, atol=1e-12)
         if isinstance(state.mode, Leaving):
             assert not isinstance(state.mode.then, Following)
         if isinstance(state.intent, Jogging) and not state.paused:
@@ -286,8 +292,6 @@ class JointRules(RuleBasedStateMachine):
         again = isinstance(command, cmd.Stop) and before.stopped is not None
         elsewhere = isinstance(command, cmd.Follow) and not isinstance(after.mode, Following)
         early = isinstance(command, cmd.ClearStop) and clear_refusal(before, t)
-        # What it follows is part of the mode.
-        elsewhere |= isinstance(command, cmd.Go)
         if again or elsewhere or early or effect_of(command, before) is not Effect.SUPERSEDES:
             return
         plain = replace(before, mode=Positioning(before.target))

@@ -87,11 +87,11 @@ def test_branch_change_keeps_limits_and_joint_speed(
     """The place high over the base is reached by all four branches."""
     T = se3.from_rotation_translation(so3.rotation_y(-1.3), np.array([0.03, 0.0, 0.42]))
     state = take(session, state, cmd.Pose(T), cmd.EndDrag())
-    metrics = branch_options(arm, state)[BRANCHES.index(branch)].metrics
+    option = branch_options(arm, state)[BRANCHES.index(branch)]
     target = take(session, state, cmd.Branch(name=str(branch)))
     assert target.branch == branch
     assert isinstance(target.target, JointTarget)
-    assert np.allclose(target.goal, metrics.q, atol=1e-12)
+    assert np.allclose(target.goal, option.q, atol=1e-12)
     while target.moving:
         before = target.setpoint
         target = take(session, target)
@@ -115,7 +115,7 @@ def test_target_is_kept_on_the_other_shoulder(
         start = point(arm, session.ready)
         state = take(session, state, cmd.Position(start + fraction * (desired - start)))
     assert isinstance(state.target, ToolTarget)
-    back = take(session, state, cmd.Branch("back", "up"))
+    back = take(session, state, cmd.Branch(name="back-up"))
     assert isinstance(back.target, ToolTarget)
     for after in (state, back):
         assert isinstance(after.target, ToolTarget)
@@ -131,13 +131,13 @@ def test_branch_options_predict_the_result_of_taking_them(
 ) -> None:
     state = take(session, state, cmd.Position(point(arm, state.goal) + 0.05 * UP))
     for branch, option in zip(BRANCHES, branch_options(arm, state), strict=True):
-        metrics = option.metrics
         assert option.contact is None
         target = take(session, state, cmd.Branch(name=str(branch)))
-        assert metrics.branch == branch
-        assert np.allclose(target.goal, metrics.q, atol=1e-12)
-        assert metrics.within_limits
-        assert metrics.distance == np.abs(metrics.q - state.q).max()
+        assert option.branch == branch
+        assert np.allclose(target.goal, option.q, atol=1e-12)
+        assert option.within_limits
+        assert option.distance == np.abs(option.q - state.q).max()
+        assert option.time == (np.abs(option.q - state.q) / arm.chain.speed).max()
 
 
 # The arm cannot have the pitch of the target at this position, nor its yaw at any position.

@@ -11,7 +11,7 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.modes import JointTarget
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.maths.collision.clearance import MIN_CLEARANCE
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.geometry.curve import JointCurve
@@ -152,7 +152,7 @@ def test_arm_in_a_contact_may_only_leave_it(guarded: Session, world: CollisionWo
 def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> None:
     """Close to the base the other elbow has no room."""
     state = standing(guarded, np.radians((10.5, -75.6, 94.5, 88.4, 47.8)))
-    options = {choice.metrics.branch: choice for choice in guarded.choices(state)}
+    options = {choice.branch: choice for choice in guarded.choices(state)}
     own = options[state.branch]
     assert own.contact is None
     blocked = [choice for choice in options.values() if choice.contact is not None]
@@ -160,7 +160,7 @@ def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> 
     for choice in blocked:
         assert choice.contact is not None
         assert choice.contact.distance < MIN_CLEARANCE
-        changed, near = run(guarded, state, cmd.Branch(name=str(choice.metrics.branch)), ticks=2000)
+        changed, near = run(guarded, state, cmd.Branch(name=str(choice.branch)), ticks=2000)
         assert changed.status is Status.BLOCKED
         assert min(near) > 0.0
 

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.arm import NO_GRIPPER, ArmModel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.objects.gripper_model import NO_GRIPPER
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.tool_targets import current_target
 from katana450.arm.control.state.messages import PRIORITIES

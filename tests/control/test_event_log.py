@@ -10,7 +10,7 @@ import pytest
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.event_log import LogEntry, entries_between
+from katana450.arm.control.state.findings import LogEntry, entries_between
 from katana450.arm.control.state.messages import REASONS, STATUS, sentence
 from katana450.arm.control.state.state import Finding, Reason, State, Status
 from tests.ticks import TICK, during

@@ -122,7 +122,7 @@ def test_plan_is_followed_to_its_end_in_its_duration(session: Session, state: St
 def test_cup_stays_level_and_on_its_path_under_any_pacing(
     arm: ArmModel, session: Session, poured: Plan
 ) -> None:
-    """Pauses, motion back, stops at any place and changes of speed come at any time."""
+    """Pauses and changes of speed come at any time."""
     random = np.random.default_rng(11)
     commands: dict[int, list[cmd.Command]] = {0: [cmd.Follow(poured)]}
     for tick in np.cumsum(random.integers(5, 90, 40)).tolist():
@@ -131,13 +131,11 @@ def test_cup_stays_level_and_on_its_path_under_any_pacing(
                 cmd.Pause(),
                 cmd.Resume(),
                 cmd.Resume(),
-                cmd.GoAlong(float(random.uniform())),
-                cmd.GoAlong(float(random.integers(2))),
                 cmd.Speed(float(random.uniform(0.05, 1.0))),
-            )[random.integers(6)]
+            )[random.integers(4)]
         ]
     last = max(commands)
-    commands[last + 1] = [cmd.Resume(), cmd.Speed(1.0), cmd.GoAlong(1.0)]
+    commands[last + 1] = [cmd.Resume(), cmd.Speed(1.0)]
     start = session.begin(poured.start, 0.0, 0.0)
     states = trace(session, start, commands, last + 1100)
     assert states[-1].setpoint == pytest.approx(poured.end, abs=0.0)
@@ -158,22 +156,6 @@ def test_cup_stays_level_and_on_its_path_under_any_pacing(
     assert max(abs(pitch_held - pitch) for pitch_held, _ in held) < 1e-14
     visited = {state.following.number for state in states if state.following is not None}
     assert visited == {0, 1, 2}
-    turned = [state.following.pace.qd[0] < 0.0 for state in states if state.following is not None]
-    assert sum(turned) > 100
-
-
-def test_plan_can_be_followed_step_by_step(session: Session, poured: Plan) -> None:
-    start = session.begin(poured.start, 0.0, 0.0)
-    state = session.step(start, [cmd.Follow(poured), cmd.Pause()], TICK)
-    for begin in poured.begins[1:]:
-        fraction = begin / poured.span
-        state = until_rest(session, state, cmd.GoAlong(fraction), cmd.Resume())[-1]
-        assert state.following is not None
-        assert state.following.fraction == pytest.approx(fraction, abs=1e-12)
-        assert state.motion.at_rest
-        assert state.setpoint == pytest.approx(poured.q(begin), abs=1e-9)
-    back = until_rest(session, state, cmd.GoAlong(0.0))[-1]
-    assert (back.setpoint == poured.start).all()
 
 
 def test_plan_from_another_posture_is_refused(session: Session, poured: Plan) -> None:
@@ -187,14 +169,6 @@ def test_plan_from_another_posture_is_refused(session: Session, poured: Plan) ->
     assert not after.moving
     returned = session.step(after, [cmd.Joints(poured.start)], 2 * TICK)
     assert returned.findings == ()
-
-
-@pytest.mark.parametrize("fraction", [-0.1, 1.1, math.nan, "end"])
-def test_invalid_plan_commands_are_refused(fraction: object) -> None:
-    with pytest.raises(InputError, match="fraction"):
-        cmd.GoAlong(fraction)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="plan"):
-        cmd.Follow(fraction)  # type: ignore[arg-type]
 
 
 def test_plan_for_another_arm_is_refused(arm: ArmModel, session: Session, poured: Plan) -> None:
@@ -229,7 +203,7 @@ def test_stop_on_a_plan_is_as_fast_as_the_joints_allow(session: Session, poured:
     )
     assert finding.amount == pytest.approx(travel, abs=1e-4)
     assert stopped[0].following is None
-    for command in (cmd.GoAlong(1.0), cmd.Follow(poured), cmd.Resume()):
+    for command in (cmd.Follow(poured), cmd.Resume()):
         after = trace(session, stopped[-1], {0: [command]}, 20)[-1]
         assert (after.setpoint == stopped[-1].setpoint).all()
     free = trace(session, cleared(session, stopped[-1]), {}, 50)[-1]
@@ -306,10 +280,7 @@ def test_obstacle_added_after_planning_is_met_at_rest(
     # Where the plan is not known to be clear, no shorter piece of the path is checked.
     assert min(clearance(world, state) for state in states) >= MIN_CLEARANCE - MAX_UNCHECKED_PATH
     assert off_path(states, plan) <= 1e-15
-    # The path back is clear, and so is the path onwards without the cup.
-    back = until_rest(guarded, states[-1], cmd.GoAlong(0.0))
-    assert (back[-1].setpoint == LOW).all()
-    assert back[-1].status is Status.OK
+    # The path onwards is clear without the cup.
     freed = Session(arm, guarded.ready, cupless)
     assert (until_rest(freed, states[-1])[-1].setpoint == BEYOND_CUP).all()
 

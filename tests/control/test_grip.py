@@ -14,8 +14,8 @@ from katana450.arm.control.session.plans import plan_along, plan_to
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import MAX_OBJECTS, SceneObject, Shape
 from katana450.arm.control.state.state import Reason, State
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.collision import scene_objects_of
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
 from katana450.extensions.programs.planning.curve_path import ToolPath

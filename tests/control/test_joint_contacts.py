@@ -12,8 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from katana450.arm.control.arm import JointSet
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.joints import JointSet
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.messages import sentence
 from katana450.arm.control.state.scene_objects import Attachment

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from katana450.arm.control.arm import JointSet
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.joints import JointSet
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.appearance import AppearanceTrait, DisplayMode
 from katana450.arm.control.state.state import Reason, State, Status
@@ -76,7 +76,7 @@ def test_stop_takes_the_reported_distance_and_holds_until_cleared(
     "command",
     [
         cmd.Pose(np.eye(4)), cmd.Position(np.zeros(3)), cmd.Turn(0.0, 0.0),
-        cmd.Tool("tcp"), cmd.Gripper(0.1), cmd.GoAlong(0.5), cmd.Jog(np.full(5, 0.1)),
+        cmd.Tool("tcp"), cmd.Gripper(0.1), cmd.Jog(np.full(5, 0.1)),
         cmd.Batch((cmd.Home(), cmd.Gripper(0.0))),
     ],
 )  # fmt: skip

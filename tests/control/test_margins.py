@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.margins import margins
+from katana450.arm.control.state.findings import margins
 from katana450.maths.kinematics.forward import jacobian_body
 from katana450.maths.kinematics.velocity import characteristic_length
 

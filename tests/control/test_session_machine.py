@@ -8,11 +8,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import precondition, rule, run_state_machine_as_test
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.session.plans import detour_from, plan_to
+from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.tool_targets import current_target
-from katana450.arm.control.state.following import Following
 from katana450.arm.control.state.messages import PRIORITIES
-from katana450.arm.control.state.modes import Jogging, Positioning, Tracking
+from katana450.arm.control.state.modes import Following, Jogging, Positioning, Tracking
 from katana450.errors import KatanaError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
@@ -91,33 +90,6 @@ class ArmRules(JointRules):
                 self.run([cmd.Home(), cmd.Gripper(0.0)], 2)
                 self.wait_and_clear(5)
 
-    @precondition(lambda self: self.state.beyond_gap is not None)
-    @rule(go=st.booleans(), ticks=ticks)
-    def take_detour(self, go: bool, ticks: int) -> None:
-        """Wait for rest, offer a detour, and take it or not."""
-        for _ in range(300):
-            if not self.state.moving:
-                break
-            self.tick(())
-        arm, state = self.session.require_arm(), self.state
-        if state.beyond_gap is None or state.moving or state.paused or state.blocked:
-            return
-        try:
-            detour = detour_from(arm, self.session.world_at(state), state)
-        except KatanaError:
-            return
-        self.run([cmd.OfferDetour(detour)], ticks)
-        offered = self.state.detour
-        assert offered is not None
-        if go:
-            self.run([cmd.Go()], ticks)
-            assert self.state.following is not None
-
-    @rule(ticks=ticks)
-    def go_without_offer(self, ticks: int) -> None:
-        if self.state.detour is None:
-            self.run([cmd.Go()], ticks)
-
     @rule(pitch=fractions(1), roll=fractions(1), ticks=ticks)
     def turn(self, pitch: FloatArray, roll: FloatArray, ticks: int) -> None:
         self.run([cmd.Turn(1.5 * float(pitch[0]), float(roll[0]))], ticks)
@@ -165,10 +137,6 @@ class ArmRules(JointRules):
         """Follow the plan again from any place of the arm."""
         assert self.plan is not None
         self.run([cmd.Follow(self.plan)], ticks)
-
-    @rule(part=st.integers(0, 8), ticks=ticks)
-    def go_along(self, part: int, ticks: int) -> None:
-        self.run([cmd.GoAlong(part / 8.0)], ticks)
 
     @rule(angle=st.integers(-3, 9), ticks=ticks)
     def grip(self, angle: int, ticks: int) -> None:

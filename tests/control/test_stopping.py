@@ -10,10 +10,17 @@ import pytest
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
-from katana450.arm.control.session.stopping import HOLD_OFF, REPORTED_PRESSES, clear_refusal, joined
+from katana450.arm.control.session.stopping import (
+    HOLD_OFF,
+    PAUSE_TIMEOUT,
+    REPORTED_PRESSES,
+    SilenceProfile,
+    at_rest,
+    clear_refusal,
+    joined,
+    restarted,
+)
 from katana450.arm.control.state.messages import finding_text
-from katana450.arm.control.state.restart import at_rest, restarted
 from katana450.arm.control.state.state import Finding, Reason, State, Status, Verdict
 from katana450.arm.control.state.stop_cause import WATCHDOG, StopCause, pressed
 from katana450.maths.kinematics.priority import Priority

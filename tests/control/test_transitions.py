@@ -15,9 +15,9 @@ from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.transitions import TABLE, Effect, effect_of, row_of
 from katana450.arm.control.state.appearance import AppearanceTrait
-from katana450.arm.control.state.following import Following
 from katana450.arm.control.state.modes import (
     MODES,
+    Following,
     Idle,
     Jogging,
     Leaving,
@@ -32,7 +32,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
-from tests.control.test_traits import examples
+from tests.control.test_commands import examples
 from tests.ticks import ticked
 
 COMMANDS = classes_of(cmd.Command)
@@ -71,9 +71,6 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
         cmd.SetPriority: lambda: cmd.SetPriority(Priority.POSITION),
         cmd.Branch: lambda: cmd.Branch(name=str(BRANCHES[-1])),
         cmd.Follow: lambda: cmd.Follow(
-            plan_to(session.require_arm(), None, state, session.ready + 0.3)
-        ),
-        cmd.OfferDetour: lambda: cmd.OfferDetour(
             plan_to(session.require_arm(), None, state, session.ready + 0.3)
         ),
         cmd.PlaceObject: lambda: cmd.PlaceObject(cup),
@@ -163,10 +160,6 @@ def test_each_command_has_its_effect_in_each_mode(
         # A jog reports its own findings in every tick.
         assert Reason.NOT_AT_START in reasons or after.jogging is not None
         effect = Effect.ACCEPTED
-    if kind is cmd.Go:
-        # It is refused without an offer.
-        assert before.detour is None
-        effect = Effect.REFUSED
     match effect:
         case Effect.ACCEPTED:
             assert type(after.intent) is type(before.intent)

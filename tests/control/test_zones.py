@@ -11,8 +11,7 @@ import pytest
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.environment import obstacle_of
 from katana450.arm.control.session.plans import plan_along
-from katana450.arm.control.session.session import Session
-from katana450.arm.control.session.slow_zones import SLOW_SPEED
+from katana450.arm.control.session.session import SLOW_SPEED, Session
 from katana450.arm.control.state.scene_objects import SceneObject, Shape, Zone
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.errors import InputError

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.drivers.driver import SimulatedDriver
 from katana450.errors import InputError
 
 START = np.array([0.0, -1.0, 1.0, 0.5, 0.0])

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from katana450.arm.control.actor import SERVER
+from katana450.arm.control.lease import SERVER
 from katana450.assembly.event_log.disk_log import MAX_FILE_BYTES, MAX_FILES, DiskLog, log_files
 from katana450.assembly.event_log.record_maker import Record
 from katana450.server.service.recorder import Recorder

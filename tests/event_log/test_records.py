@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Command
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import Actor, CommandChannel, Grounds, Person, Role
 from katana450.arm.control.session.session import Session
 from katana450.assembly.event_log.disk_log import MAX_LINE_BYTES, encoded
 from katana450.assembly.event_log.record_maker import (
@@ -30,7 +29,7 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.recorder import MAX_WAITING, Note, Recorder
 from tests.browser.server import APP, AppServer
-from tests.control.test_traits import examples
+from tests.control.test_commands import examples
 from tests.event_log.logs import records
 
 ANNA = Actor(

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.script.script import Script, parse

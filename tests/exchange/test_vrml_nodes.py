@@ -17,10 +17,9 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.appearance import AppearanceTrait
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.bare import bare
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.loader import load
-from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.robot import Robot, bare
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.extensions.export.vrml.vrml_files import initial_objects, world_of

@@ -1,11 +1,10 @@
-"""Motions by requests: joints, poses, nudges, streams and detours, and what a state derives."""
+"""Motions by requests: joints, poses, nudges and streams, and what a state derives."""
 
 from __future__ import annotations
 
 import itertools
 import math
 import time
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -15,10 +14,8 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import Shape
 from katana450.arm.control.state.state import Reason
-from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.weight import loads_of
-from katana450.assembly.robot_session import DescribedRobot
+from katana450.arm.robot.arm_reader import MountedArm
+from katana450.arm.robot.robot import Robot, loads_of
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
@@ -28,7 +25,6 @@ from katana450.maths.kinematics.velocity import limit_distances, singular_values
 from katana450.server.api import answers, requests
 from tests.gateway.postures import READY, THERE
 from tests.gateway.virtual import VirtualServer
-from tests.waiting import state_when
 
 
 def test_program_moves_joints_and_waits_for_their_arrival(program: Client, arm: MountedArm) -> None:
@@ -107,10 +103,10 @@ def test_state_includes_values_derived_from_the_posture(
 
 def test_other_branch_is_reached_on_a_clear_path(program: Client) -> None:
     program.joints(np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)))
-    state = program.go(requests.Branch(shoulder="front", elbow="down"))
+    state = program.go(requests.Branch(name="front-down"))
     assert state.branch == ("front", "down")
     assert state.status == "ok"
-    back = program.go(requests.Branch(shoulder="front", elbow="up"))
+    back = program.go(requests.Branch(name="front-up"))
     assert back.branch == ("front", "up")
 
 
@@ -290,42 +286,3 @@ def test_object_is_placed_near_a_point_of_the_table(program: Client) -> None:
     program.ask(requests.Remove(name="near"))
     with pytest.raises(RefusedError, match="nothing carries it there"):
         program.ask(structs.replace(ball, near=(1.3, 1.3)))
-
-
-TARGET = (0.008, 0.025, 0.443)
-"""[m] A point above the shoulder. A drag there from the ready posture ends at limits."""
-
-
-@pytest.fixture
-def offered(described: DescribedRobot) -> Iterator[Client]:
-    """Connect a program to a server that offers detours."""
-    with VirtualServer(described, detours=True) as server, server.connect("Test") as program:
-        yield program
-
-
-def held_at_the_gap(program: Client) -> answers.State:
-    """Drag from the ready posture to TARGET, and return the state with a detour on offer."""
-    program.go(requests.Home())
-    program.go(requests.Position(p=np.array(TARGET)))
-    return state_when(program, lambda state: state.detour is not None)
-
-
-def distance(state: answers.State) -> float:
-    assert state.T is not None
-    return math.dist([row[3] for row in state.T[:3]], TARGET)
-
-
-def test_offered_detour_is_taken_by_go(offered: Client) -> None:
-    state = held_at_the_gap(offered)
-    assert state.detour is not None
-    assert state.status == "gap"
-    assert f"Reachable by a {state.detour:.1f} s detour: press Enter or Go" in state.why
-    assert not state.moving
-    assert distance(state) > 0.01
-    offered.ask(requests.EndDrag())
-    rested = offered.query(answers.State)
-    assert rested.q == state.q
-    arrived = offered.go(requests.Go())
-    assert distance(arrived) < 1e-6
-    assert arrived.branch == state.branch
-    assert arrived.detour is None

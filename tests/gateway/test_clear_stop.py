@@ -8,9 +8,8 @@ from typing import Any, cast
 
 import pytest
 
-from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import SERVER, Actor, CommandChannel, Grounds, Person, Role
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import ActiveStop, State
 from katana450.arm.control.state.stop_cause import StopCause, pressed

@@ -15,9 +15,8 @@ import pytest
 import viser
 
 import katana450
-from katana450.arm.control.actor import SERVER, Actor, Grounds
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Role
+from katana450.arm.control.lease import SERVER, Actor, Grounds, Role
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.errors import LeaseError
 from katana450.server.service.hub import TICK
@@ -240,8 +239,6 @@ DELIVERIES = {
     # Behind the gate the handle passes commands on; the worker also adds the planned path.
     ("server/service/arm_handle.py", "self._sink"),
     ("arm/runtime/planning_worker.py", "self._arm"),
-    # An offer moves nothing.
-    ("arm/runtime/detour_planner.py", "self._arm"),
 }
 """Files, and the objects to which they deliver commands."""
 

@@ -10,14 +10,13 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import LEASE_TIMEOUT, Lease, Role
+from katana450.arm.control.lease import LEASE_TIMEOUT, Actor, CommandChannel, Lease, Role
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.session.silence import SilenceProfile
+from katana450.arm.control.session.stopping import SilenceProfile
 from katana450.arm.control.session.tool_targets import BranchOption
 from katana450.arm.control.state.state import ActiveStop, Finding, Reason, State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.pipes.state_publisher import Snapshot
 from katana450.errors import LeaseError

@@ -9,9 +9,8 @@ from typing import Any
 
 import pytest
 
-from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import CommandChannel, Person, Role
 from katana450.errors import InputError
 from katana450.server.service import people as people_module
 from katana450.server.service import status

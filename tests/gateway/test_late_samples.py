@@ -14,7 +14,7 @@ import viser
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.session.stopping import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state.state import Reason
 from katana450.errors import LateError
 from katana450.server.api import requests

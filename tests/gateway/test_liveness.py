@@ -15,7 +15,7 @@ import pytest
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.session.stopping import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.arm.control.state.stop_cause import StopCause
 from katana450.arm.runtime.readiness import LAST_ACK_RECEIVED

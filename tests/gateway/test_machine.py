@@ -67,7 +67,7 @@ def test_arm_answer_gives_the_reason_for_joints_only(
     cartesian: list[requests.Request] = [
         requests.Pose(T=np.eye(4)), requests.Position(p=np.array((0.1, 0, 0))),
         requests.Turn(pitch=0, roll=0), requests.Jog(rates=np.array((0.1, 0, 0, 0, 0))),
-        requests.Branch(shoulder="front", elbow="up"),
+        requests.Branch(name="front-up"),
         requests.Gripper(angle=0.1), requests.Tool(name="tcp"), Program(text="steps: []"),
     ]  # fmt: skip
     for request in cartesian:
@@ -148,7 +148,7 @@ def place(
 def test_table_is_named_at_the_start_and_stops_a_joint(
     on_table: DescribedRobot, column_arm: Client
 ) -> None:
-    assert "The table is 300 mm below the base, under base." in " ".join(on_table.notes)
+    assert "The table is 300 mm below the base." in " ".join(on_table.notes)
     outcome = end(column_arm.ask(requests.Joint(axis=1, value=-0.4, wait=30)))
     assert outcome.how == "contact"
     assert outcome.why.startswith("Beam and table are ")

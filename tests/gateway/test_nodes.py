@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.browser.server import ROOT, AppServer

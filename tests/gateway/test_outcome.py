@@ -112,7 +112,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.SetPriority: [
             requests.SetPriority(priority=priority) for priority in reversed(PRIORITIES)
         ],
-        requests.Branch: [requests.Branch(shoulder="front", elbow="down")],
+        requests.Branch: [requests.Branch(name="front-down")],
         requests.Hold: [requests.Hold()],
         requests.Place: [
             requests.Place(name="ball", T=place, shape=requests.Shape.SPHERE, size=[0.02])
@@ -140,8 +140,6 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Acquire, requests.Take, requests.Ask, requests.Withdraw, requests.ReleaseLease,
         requests.Give, requests.Decline, requests.Rename,
         requests.ListPeople, requests.Kick, ChooseRobot,
-        # Refused without a detour on offer; see test_api_motion.
-        requests.Go,
         # Refused at a simulated arm.
         requests.OperateArm,
     }  # fmt: skip

@@ -10,9 +10,8 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from katana450.arm.control.actor import Grounds
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Role
+from katana450.arm.control.lease import Grounds, Role
 from katana450.arm.control.session.session import Session
 from katana450.errors import LeaseError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT

@@ -25,12 +25,11 @@ from starlette.applications import Starlette
 from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 from websockets.frames import Close
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.session.silence import SilenceProfile
-from katana450.arm.drivers.simulated import SimulatedDriver
-from katana450.arm.robot.initial_scene import InitialScene
-from katana450.arm.runtime.detour_planner import DetourPlanner
+from katana450.arm.control.lease import Actor
+from katana450.arm.control.session.stopping import SilenceProfile
+from katana450.arm.drivers.driver import SimulatedDriver
+from katana450.arm.robot.object_meshes import InitialScene
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.planning_worker import PlanningWorker
@@ -291,12 +290,8 @@ class VirtualServer:
         *words: str,
         access: AccessFile | None = None,
         profile: SilenceProfile = SilenceProfile.REAL_ARM,
-        detours: bool = False,
     ) -> None:
-        """Start a server with the robot ``found`` and the options ``words`` of `serve`.
-
-        ``detours``: whether detours are planned, for which the time passes more slowly.
-        """
+        """Start a server with the robot ``described`` and the options ``words`` of `serve`."""
         self.clock = VirtualClock()
         self.loop = VirtualLoop(self.clock)
         options, settings, now = _options(words), Settings(), self.clock.now
@@ -336,10 +331,6 @@ class VirtualServer:
             worker.redirected = guarded(hub.runner.redirected)
         values = load(NODES)(robot, session.environment)
         hub.gate.arm = ArmHandle(robot, session, pipe, worker, values)
-        self._detours: DetourPlanner | None = None
-        if detours and worker is not None:
-            self._detours = DetourPlanner(session, self.arm.state_publisher, worker)
-            self._detours.start()
         self._tasks = [self.loop.create_task(part) for part in (self.arm.run(hub), self._watch())]
 
     def _soon(self, act: Any, *arguments: Any) -> None:
@@ -369,8 +360,6 @@ class VirtualServer:
 
     def __exit__(self, *_error: object) -> None:
         """End all that runs."""
-        if self._detours is not None:
-            self._detours.stop()
         tasks = asyncio.all_tasks(self.loop)
         for task in tasks:
             task.cancel()

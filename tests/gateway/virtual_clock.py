@@ -7,14 +7,16 @@ import selectors
 import threading
 from typing import Any
 
+from katana450.arm.runtime.clock import MonotonicClock
+
 PERIOD = 0.01
 """[s] Period of the control loop while the arm moves."""
 
-PLANNERS = ("planning", "planner", "detours")
+PLANNERS = ("planning", "planner")
 """Names of threads that plan. They take real time."""
 
 
-class VirtualClock:
+class VirtualClock(MonotonicClock):
     """A clock that is set."""
 
     def __init__(self) -> None:

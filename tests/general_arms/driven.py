@@ -6,9 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.arm import NO_GRIPPER, ArmModel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.objects.gripper_model import NO_GRIPPER
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.extensions.general_arms.driven_tool import DrivenTool

@@ -15,6 +15,7 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.motion.limiter import JointMotion
 from tests.general_arms.driven import begun, pose, run, session_of, settled
 from tests.general_arms.published_arms import FOUR, KR_6, PANDA, SEVEN, UR5E
 from tests.general_arms.test_random_drags import is_clear
@@ -65,7 +66,10 @@ def test_drag_with_a_clear_way_arrives(name: str) -> None:
     drag = DRAGS[name]
     chain = SEVEN[drag.arm]
     tool, q = DrivenTool(chain), np.array(drag.start)
-    state, since = State.standing(q, 0.0, 0.0, "tcp", tool.branch_of(q)), tool.target_at(q)
+    state, since = (
+        State(0.0, q, 0.0, JointMotion.rest(q), 0.0, q, 0.0, "tcp", tool.branch_of(q)),
+        tool.target_at(q),
+    )
     target = ToolTarget(
         since.position + np.array(drag.move), rotation=so3.exp(np.array(drag.turn)) @ since.R
     )

@@ -224,13 +224,11 @@ def test_other_branch_keeps_the_pose(chain: Chain) -> None:
     session, start, T = ready(chain)
     arm = session.require_arm()
     choices = session.choices(start)
-    assert [choice.metrics.branch for choice in choices] == list(arm.kinematics.branches)
+    assert [choice.branch for choice in choices] == list(arm.kinematics.branches)
     usable = [
-        choice.metrics
+        choice
         for choice in choices
-        if not choice.refusal
-        and choice.metrics.position_error < 1e-6
-        and choice.metrics.branch != start.branch
+        if not choice.refusal and choice.position_error < 1e-6 and choice.branch != start.branch
     ]
     assert usable
     goal = with_branch(arm, start, usable[-1].branch).goal
@@ -243,7 +241,7 @@ def test_other_branch_keeps_the_pose(chain: Chain) -> None:
 def test_branch_that_the_limits_exclude_has_a_reason_and_is_refused_with_it(name: str) -> None:
     session = session_of(ARMS[name])
     arm, start = session.require_arm(), begun(session)
-    refused = {choice.metrics.branch: choice.refusal for choice in session.choices(start)}
+    refused = {choice.branch: choice.refusal for choice in session.choices(start)}
     assert refused[start.branch] == ""
     assert set(refused) == set(arm.kinematics.branches)
     for branch, why in refused.items():

@@ -276,7 +276,7 @@ def test_every_branch_is_taken_or_refused() -> None:
     state = session.begin(q, 0.0, 0.0)
     T, refused = pose(session, state), set()
     for option in branch_options(arm, state):
-        name = option.metrics.branch
+        name = option.branch
         if option.refusal:
             refused.add(name)
             with pytest.raises(InputError, match=f"No posture of branch {name} has the tool at"):

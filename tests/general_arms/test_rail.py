@@ -12,7 +12,7 @@ import pytest
 import katana450
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.margins import margins
+from katana450.arm.control.state.findings import margins
 from katana450.arm.control.state.messages import sentence
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.assembly.robot_session import find_robot

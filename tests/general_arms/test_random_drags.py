@@ -20,6 +20,7 @@ from katana450.maths.kinematics.forward import jacobian_space
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import near_turns
+from katana450.maths.motion.limiter import JointMotion
 from tests.conftest import MANY_DRAGS
 from tests.general_arms.published_arms import FOUR, NEAR_MISS, OFFSET, SEVEN, SIX, SKEWED
 
@@ -121,7 +122,7 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
         if number % DRAGS_OF_A_TRIP == 0:
             even = number // DRAGS_OF_A_TRIP % 2 == 0
             q = ready if even else rng.uniform(chain.lower, chain.upper)
-            state = State.standing(q, 0.0, 0.0, "tcp", tool.branch_of(q))
+            state = State(0.0, q, 0.0, JointMotion.rest(q), 0.0, q, 0.0, "tcp", tool.branch_of(q))
             state = replace(state, priority=priority)
             since, exact = tool.target_at(q), True
         # Four axes can only pitch their tool.

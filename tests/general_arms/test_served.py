@@ -13,7 +13,7 @@ import pytest
 
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.assembly.robot_session import find_robot
 from katana450.client import Client
 from katana450.maths.geometry import se3, so3

@@ -28,7 +28,7 @@ declare namespace Page {
   interface Status {
     mood: string; headline: string; why: string; end: string;
     stop: string | null; stopped: string | null; stopped_at: number | null;
-    wait: string; problem: string | null; holder: string | null; silence_profile: string; detour: boolean;
+    wait: string; problem: string | null; holder: string | null; silence_profile: string;
     speed: number; paused: boolean; arm: ArmStatus | null; participants: number; revocations: number; scripts: boolean;
     pace: string; may_clear_stop: boolean; until: string; name: string; role: string; mine: boolean;
     own_program: boolean; asked: boolean; asking: Named[]; others: Named[]; planning: boolean;

@@ -2,7 +2,7 @@
 declare namespace Api {
   interface Acquire { do: "acquire"; id?: number | string | null; revocations?: number | null; made?: number | null; }
   type Act = Acquire | Ask | Attach | Branch | Breakpoints | ChooseRobot | ClearStop | Decline | EndDrag | Fill | Get |
-    Give | Go | GoToZero | Gripper | Heartbeat | Hello | Hold | Home | Jog | Joint | Joints | Kick | ListPeople | Load |
+    Give | GoToZero | Gripper | Heartbeat | Hello | Hold | Home | Jog | Joint | Joints | Kick | ListPeople | Load |
     Nudge | OperateArm | Orient | Pause | Place | Pose | Position | Preview | Program | Query | Redo | ReleaseLease |
     Remove | Rename | Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn |
     TurnElbow | Undo | Watch | Withdraw;
@@ -18,9 +18,8 @@ declare namespace Api {
   interface Attach { do: "attach"; name: string; to: Attachment; T?: number[][] | null; id?: number | string | null;
     revocations?: number | null; made?: number | null; }
   type Attachment = "hand" | "table" | "world";
-  interface Branch { do: "branch"; shoulder?: "back" | "front" | null; elbow?: "down" | "up" | null;
-    name?: string | null; id?: number | string | null; revocations?: number | null; made?: number | null;
-    wait?: number | null; }
+  interface Branch { do: "branch"; name: string; id?: number | string | null; revocations?: number | null;
+    made?: number | null; wait?: number | null; }
   interface BranchOption { name: string; shoulder: string | null; elbow: string | null; q: number[];
     within_limits: boolean; position_error: number; rotation_error: number; distance: number; time: number;
     smallest_singular_value: number; contact: [string, string] | null; refusal: string; }
@@ -54,8 +53,6 @@ declare namespace Api {
     node: string; field: string; more?: FieldName[]; }
   interface Give { do: "give"; id?: number | string | null; revocations?: number | null; made?: number | null;
     to: number; }
-  interface Go { do: "go"; id?: number | string | null; revocations?: number | null; made?: number | null;
-    wait?: number | null; }
   interface GoToZero { do: "go_to_zero"; id?: number | string | null; revocations?: number | null; made?: number | null;
     wait?: number | null; }
   interface Gripper { do: "gripper"; angle: number; id?: number | string | null; revocations?: number | null;
@@ -155,9 +152,9 @@ declare namespace Api {
     T: number[][] | null; pitch: number | null; roll: number | null; tool_speed: number | null;
     holding: number[] | null; margins: Margins | null; touching: string[]; touch: Touch | null; held: string | null;
     branch: string[] | null; priority: string | null; status: string; moving: boolean; why: string; findings: Finding[];
-    detour: number | null; speed: number; holder: string | null; stopped: string | null; stop: string | null;
-    stopped_at: number | null; clearable: boolean; revocations: number; silence_profile: string; age: number;
-    participants: number; water: Water | null; arm?: MeasuredArm | null; program?: Progress | null; fields?: Value[]; }
+    speed: number; holder: string | null; stopped: string | null; stop: string | null; stopped_at: number | null;
+    clearable: boolean; revocations: number; silence_profile: string; age: number; participants: number;
+    water: Water | null; arm?: MeasuredArm | null; program?: Progress | null; fields?: Value[]; }
   interface Steer { do: "steer"; id?: number | string | null; revocations?: number | null; made?: number | null;
     wait?: number | null; order: ProgramOrder; unattended?: boolean; at?: number | null; }
   interface StepTool { do: "step_tool"; by: number[]; frame?: JogFrame; id?: number | string | null;

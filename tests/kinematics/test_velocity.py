@@ -7,15 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control.session.tool_targets import BranchMetrics
 from katana450.errors import InputError
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body
-from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.velocity import (
     WELL_CONDITIONED,
     JogFrame,
@@ -179,29 +176,6 @@ def test_invalid_jog_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         jog(chain, q, V, JogFrame.BASE, dt)
-
-
-def test_branch_metrics_give_the_cost_of_a_branch(chain: Chain) -> None:
-    T = forward(chain, READY)
-    all_metrics = [
-        BranchMetrics.of(chain, solution, READY) for solution in inverse(chain, T, q_hint=READY)
-    ]
-    assert tuple(metrics.branch for metrics in all_metrics) == BRANCHES
-    present = all_metrics[0]
-    assert present.distance == pytest.approx(0.0, abs=1e-9)
-    assert present.within_limits
-    for metrics in all_metrics:
-        assert np.allclose(forward(chain, metrics.q), T, atol=1e-9)
-        assert metrics.position_error < 1e-9
-        assert metrics.within_limits == chain.within_limits(metrics.q)
-        turns = np.abs(metrics.q - READY)
-        assert metrics.distance == turns.max()
-        assert metrics.time == pytest.approx((turns / chain.speed).max())
-        assert metrics.time >= metrics.distance / chain.speed.max()
-        assert metrics.smallest_singular_value == singular_values(chain, metrics.q)[-1]
-    # The other elbow needs a motion of its own, the other shoulder half a turn of axis 1.
-    assert all_metrics[2].distance >= math.pi - 1e-9
-    assert 0.1 < all_metrics[1].distance < math.pi
 
 
 def test_twists_are_of_the_tool_point(chain: Chain) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.forward import forward

@@ -12,7 +12,7 @@ from katana450.maths.collision.shape import CollisionShape, box, half_space
 from katana450.maths.collision.world import Part, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.physics.body import BodyMotion, RigidBody
+from katana450.maths.physics.model import BodyMotion, RigidBody
 from katana450.maths.physics.simulation import BodySimulation, poses_of
 from tests.ticks import TICK
 

@@ -12,8 +12,7 @@ from katana450.maths.collision.shape import box
 from katana450.maths.collision.world import Part
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.physics.body import BodyMotion, RigidBody
-from katana450.maths.physics.model import PAD_FRICTION, FingerDrive
+from katana450.maths.physics.model import PAD_FRICTION, BodyMotion, FingerDrive, RigidBody
 from katana450.maths.physics.simulation import BodySimulation
 from katana450.maths.water.units import GRAVITY
 from tests.physics.scenes import CUBE, HALF, pose_of

@@ -14,7 +14,7 @@ from katana450.maths.collision.shape import box, sphere
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import frozen
 from katana450.maths.physics import model
-from katana450.maths.physics.body import BodyMotion
+from katana450.maths.physics.model import BodyMotion
 from katana450.maths.physics.simulation import MAX_SPEED, PARTING_SPEED
 from tests.physics.scenes import CUBE, HALF, SIDE, Scene, body, pose, position
 from tests.ticks import TICK

@@ -9,7 +9,7 @@ import pytest
 
 from katana450.maths.collision.shape import sphere
 from katana450.maths.geometry.arrays import frozen
-from katana450.maths.physics.body import REST_TIME
+from katana450.maths.physics.model import REST_TIME
 from tests.physics.scenes import (
     HALF,
     SIDE,

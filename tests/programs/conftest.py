@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run import runner

@@ -8,8 +8,7 @@ import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.state.arm_report import ArmMode, ArmReport
-from katana450.arm.drivers.driver import DriverAnswer
-from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.drivers.driver import DriverAnswer, SimulatedDriver
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 

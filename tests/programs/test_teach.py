@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.objects.gripper_model import NO_GRIPPER
+from katana450.arm.control.arm import NO_GRIPPER, ArmModel
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool

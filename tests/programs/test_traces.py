@@ -10,7 +10,7 @@ import viser
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.plans import plan_along
 from katana450.arm.control.session.session import Session
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import Linear, ToolArc
 from katana450.extensions.programs.server.traces import (

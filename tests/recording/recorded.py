@@ -11,17 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from katana450.arm.control.actor import SERVER, Actor, CommandChannel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import SERVER, Actor, CommandChannel, Person, Role
 from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.state.scene_objects import Attachment as Mount
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.solid import Solid
 from katana450.arm.control.state.state import State
 from katana450.arm.control.state.stop_cause import pressed
-from katana450.arm.drivers.driver import Driver, DriverAnswer
-from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.drivers.driver import Driver, DriverAnswer, SimulatedDriver
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.tick import TickRecord
@@ -84,8 +82,8 @@ def random_commands(
     if state.stopped is not None:
         yield from [cmd.ClearStop()] * int(kind < 0.05)
     elif state.following is not None and kind < 0.98:
-        # Most plans are followed to their end, some of them there and back.
-        yield from [cmd.GoAlong(round(rng.random(), 3))] * int(kind < 0.02)
+        # Most plans are followed to their end.
+        rng.random()
     elif state.t % 4.0 > 2.5:
         # A while without drags, in which the arm comes to rest and can follow a plan.
         if state.motion.at_rest and kind < 0.1:

@@ -16,11 +16,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import Struct, msgpack
 
-from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import classes_of
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import SERVER, Actor, CommandChannel, Grounds, Person, Role
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.modes import Target, Tracking
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
@@ -50,12 +49,11 @@ from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import Plan, plan
 from katana450.maths.planning.scaling import Bounds
-from katana450.maths.water.flow import WaterFlow
-from katana450.maths.water.motion import Course, MotionWithWater, VesselMotion
+from katana450.maths.water.flow import Course, MotionWithWater, VesselMotion, WaterFlow
 from katana450.maths.water.units import ML
 from katana450.settings import Settings
 from tests.conftest import LONG
-from tests.control.test_traits import KINDS, examples
+from tests.control.test_commands import KINDS, examples
 
 
 def copied(kind: Any, value: Any) -> Any:
@@ -339,7 +337,7 @@ def _examples(arm: ArmModel, follow: cmd.Follow) -> None:
             "does not have",
         ),
         (b'{"is": "follow", "plan": "0123", "tau": 0}', "plan: the Plan with the key '0123' is"),
-        (b'{"is": "batch", "commands": [{"is": "go"}, {"is": "home", "a": 1}]}', r"commands\[1\]"),
+        (b'{"is":"batch","commands":[{"is":"hold"},{"is":"home","a":1}]}', r"commands\[1\]"),
     ],
 )
 def test_error_names_the_place_and_the_fault(text: bytes, expected: str) -> None:
@@ -362,9 +360,10 @@ SAMPLE = {"is": "Servo", "q": [0.1, 0.2], "qd": None, "gripper": None}
         ({"is": "TakeBranch", "branch": "left-up"}, cmd.Branch(name="left-up")),
         (
             {"is": "TakeBranch", "branch": {"shoulder": "back", "elbow": "up"}},
-            cmd.Branch("back", "up"),
+            cmd.Branch(name="back-up"),
         ),
         ({"is": "SpeedScale", "value": 0.5}, cmd.Speed(0.5)),
+        ({"is": "offer_detour", "plan": "0123"}, cmd.Batch(())),
         ({"is": "Fill", "volume": ML * 100.0}, cmd.Fill(100.0)),
         ({"is": "Hold", "finding": None}, cmd.Hold()),
         ({"is": "Pause", "finding": CAUSE_FORM}, cmd.PauseFor(CAUSE)),
@@ -380,6 +379,16 @@ SAMPLE = {"is": "Servo", "q": [0.1, 0.2], "qd": None, "gripper": None}
 def test_commands_of_older_versions_are_read(form: dict[str, Any], expected: cmd.Command) -> None:
     command = Codec().decoded(cmd.Command, form)
     assert text_of(command) == text_of(expected)
+
+
+def test_detour_of_an_older_version_is_read_as_a_plan_that_is_followed() -> None:
+    writer, reader = Codec(), Codec()
+    offer = {"is": "offer_detour", "plan": writer.encoded(SESSIONS["follow"])["plan"]}
+    for shared in writer.shared.take_new():
+        reader.shared.add(shared)
+    reader.decoded(cmd.Command, offer)
+    command = reader.decoded(cmd.Command, {"is": "go"})
+    np.testing.assert_array_equal(command.plan.end, SESSIONS["follow"].plan.end)
 
 
 def test_target_of_an_older_version_is_read_and_has_its_digest(state: State) -> None:

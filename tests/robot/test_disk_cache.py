@@ -15,9 +15,8 @@ import pytest
 
 from katana450 import disk_cache
 from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.creases import Drawn
 from katana450.arm.robot.loader import load
-from katana450.arm.robot.surfaces import shapes_of
+from katana450.arm.robot.surfaces import Drawn, shapes_of
 from katana450.assembly import page_routes
 from katana450.disk_cache import kept
 from katana450.extensions.bodies.pieces import pieces

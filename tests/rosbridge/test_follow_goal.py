@@ -9,8 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from katana450.arm.control.actor import Actor, CommandChannel
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import Actor, CommandChannel, Person, Role
 from katana450.errors import LeaseError
 from katana450.extensions.rosbridge.goals import (
     ErrorCode,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.errors import InputError
 from katana450.extensions.rosbridge.protocol import Header, JointJog, Time, Twist, Vector3
 from katana450.extensions.rosbridge.servoing import (

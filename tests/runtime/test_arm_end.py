@@ -14,21 +14,20 @@ import pytest
 
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.session import silence
+from katana450.arm.control.session import stopping
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.session.silence import SilenceProfile
-from katana450.arm.control.session.stopping import clear_refusal
+from katana450.arm.control.session.stopping import SilenceProfile, clear_refusal
 from katana450.arm.control.state.state import Finding, Outcome, Reason, Verdict
-from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.drivers.driver import SimulatedDriver
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
-from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES, Outcomes
 from katana450.arm.runtime.pipes.arm_end import ArmEnd, CommandMessage
 from katana450.arm.runtime.pipes.arm_roles import FRONT
 from katana450.arm.runtime.pipes.front_end import FrontEnd
 from katana450.arm.runtime.pipes.private_listener import Greeting
+from katana450.arm.runtime.pipes.state_publisher import MAX_KEPT_OUTCOMES, Outcomes
 from katana450.assembly import arm_process
 from katana450.assembly.arm_process import RunningArm
 from katana450.assembly.robot_session import DescribedRobot
@@ -182,7 +181,7 @@ def test_silent_front_end_stops_a_moving_arm(ends: Ends) -> None:
 def test_silent_front_end_pauses_a_simulated_arm(
     arm: ArmModel, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(silence, "PAUSE_TIMEOUT", 1.0)
+    monkeypatch.setattr(stopping, "PAUSE_TIMEOUT", 1.0)
     ends = Ends(arm, session, SilenceProfile.SIMULATION)
     front, publisher = ends.front, ends.loop.state_publisher
     assert front.profile is SilenceProfile.SIMULATION

@@ -11,16 +11,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import Actor, CommandChannel, Person, Role
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.session.silence import SilenceProfile
+from katana450.arm.control.session.stopping import SilenceProfile
 from katana450.arm.control.state.state import Finding, Reason, State, Status
 from katana450.arm.control.state.stop_cause import pressed
-from katana450.arm.drivers.driver import DriverAnswer
-from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.drivers.driver import DriverAnswer, SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox

@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import SERVER, Actor, CommandChannel, Grounds, Person, Role
 from katana450.arm.control.session import plans
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.arm.runtime import planning_worker
-from katana450.arm.runtime.loop_timing import LoopTiming
-from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
+from katana450.arm.runtime.pipes.state_publisher import LoopTiming, Snapshot, StatePublisher
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.errors import InputError
 from katana450.maths.kinematics.branch import Branch
@@ -45,7 +43,8 @@ def planned(session: Session, elbow: float) -> tuple[PlanningWorker, list[cmd.Co
     worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
     branch = state.branch
     assert isinstance(branch, Branch)
-    worker.deliver(cmd.Branch(branch.shoulder, "down" if branch.elbow == "up" else "up"), None)
+    other = "down" if branch.elbow == "up" else "up"
+    worker.deliver(cmd.Branch(name=f"{branch.shoulder}-{other}"), None)
     until(lambda: not any(thread.name == "planning" for thread in threading.enumerate()), 30.0)
     return worker, sink.commands
 
@@ -90,7 +89,7 @@ def test_path_that_is_found_after_a_stop_is_not_followed(
     state = session.begin(np.array([0.3, -0.9, 0.4, -0.6, -0.2]), 0.0, 0.0)
     sink = Sink()
     worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
-    worker.deliver(cmd.Branch("front", "down"), None)
+    worker.deliver(cmd.Branch(name="front-down"), None)
     assert free.wait(30.0)
     worker.deliver(cmd.Stop(), None)
     (thread,) = (running for running in threading.enumerate() if running.name == "planning")

@@ -13,7 +13,7 @@ import pytest
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.following import Following
+from katana450.arm.control.state.modes import Following
 from katana450.arm.control.state.solid import Solid
 from katana450.arm.runtime.pipes.state_publisher import Snapshot
 from katana450.arm.runtime.pipes.wire import MAX_NAMED_PLANS, PlanNames, PlanStore

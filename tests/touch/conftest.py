@@ -8,7 +8,7 @@ import pytest
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.assembly.robot_session import DescribedRobot, describe_robot
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings

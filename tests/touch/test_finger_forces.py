@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.environment import Hand
 from katana450.arm.control.objects.grip import FINGER_FORCE, contacts_of, finger_forces
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.event_log import entries_between
+from katana450.arm.control.session.stopping import restarted
+from katana450.arm.control.state.findings import entries_between
 from katana450.arm.control.state.messages import sentence
-from katana450.arm.control.state.restart import restarted
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import Reason, State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
+from katana450.extensions.programs.run.simulation import run_by_clock
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.maths.water.units import GRAVITY
 from katana450.server.api import answers
 from katana450.server.service import serialize
 from tests.control.test_grip import OPEN, lifted
+from tests.general_arms.test_grasping import item, planned
+from tests.general_arms.test_published_hands import KINDS
+from tests.recording.recorded import fresh
+from tests.recording.sessions import record_session
 from tests.ticks import during, rested, settled, ticked
 
 WEIGHT = 0.0614 * GRAVITY
@@ -122,3 +134,61 @@ def test_cup_falls_from_a_weak_grip_with_a_reason(
     assert max(finger_forces(hand, rest).values()) < 1.0
     opened = rested(session, rest, cmd.Gripper(OPEN))
     assert Reason.SLIPPED not in {finding.reason for finding in opened.findings}
+
+
+@pytest.mark.parametrize("name", ["SO-101", pytest.param("Robotiq 2F-85", marks=pytest.mark.long)])
+def test_both_sides_of_another_hand_press_on_a_box(name: str, tmp_path: Path) -> None:
+    kind = KINDS[name]
+    box = item("part", "box", kind.box, kind.at, 17.0)
+    plan = planned(tmp_path, kind.urdf, ["pick: part"], box)
+    state = run_by_clock(plan).states[-1]
+    hand = plan.session.environment.hand
+    assert hand is not None
+    assert state.held is not None
+    forces = {finger.finger: finger.force for finger in serialize.touch(hand, state).fingers}
+    sides = hand.gripping_sides
+    assert list(forces) == [part for side in sides for part in side]
+    one, other = (sum(forces[part] for part in side) for side in sides)
+    # Where the faces of the jaws are not parallel, friction balances the rest.
+    assert one == pytest.approx(other, rel=0.25)
+    assert 1.0 < one < 1.1 * FINGER_FORCE
+
+
+ROD = SceneObject(
+    "rod",
+    Shape.CYLINDER,
+    (0.015, 0.31),
+    np.array(((1, 0, 0, 0.4477), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1.0))),
+    can_be_held=True,
+)
+"""A rod on the table between the open fingers in the ready posture."""
+
+
+def test_grip_and_slip_are_identical_to_the_bit_in_a_recording(tmp_path: Path) -> None:
+    states: list[State] = []
+
+    def commands(tick: int, state: State) -> Iterator[cmd.Command]:
+        states.append(state)
+        if tick == 0:
+            yield cmd.Gripper(OPEN)
+        elif tick == 60:
+            yield cmd.PlaceObject(ROD)
+            yield cmd.Gripper(-0.44)
+        elif tick == 160:
+            assert state.grip is not None
+            # So little force that the moving hand loses the rod.
+            yield cmd.Gripper(state.grip - 0.01)
+        elif tick == 170:
+            yield cmd.Joint(2, state.q[1] - 0.1)
+
+    path = record_session(tmp_path / "slip.mcap", 320, commands)
+    assert max(state.squeeze for state in states[:160]) > 0.05
+    assert states[165].squeeze == pytest.approx(0.01)
+    reasons = {finding.reason for state in states for finding in state.findings}
+    assert Reason.SLIPPED in reasons
+    forces = {contact.force for state in states for contact in contacts_of(state)}
+    assert len(forces) > 20, "they change while the rod slips"
+    with RecordingFile.open(path) as file:
+        result = verify_recording(file, fresh().session)
+    assert result.identical, result
+    assert result.ticks > 150

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.commands.commands import Command
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import Actor, CommandChannel, Person, Role
 
 ANNA = Actor(Person("anna", "Anna", Role.OPERATOR), CommandChannel.SCENE, seen=0)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
 from katana450.maths.geometry import screws

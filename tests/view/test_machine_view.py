@@ -18,8 +18,7 @@ from katana450.arm.control.state.state import State
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.loop_timing import LoopTiming
-from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
+from katana450.arm.runtime.pipes.state_publisher import LoopTiming, Snapshot, StatePublisher
 from katana450.extension import provided
 from katana450.extensions.bodies.robot_world import robot_world
 from katana450.extensions.objects.handles import HandlesLayer

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
+import trimesh
 import viser
 
 from katana450.arm.control.session.session import Session
@@ -18,6 +22,8 @@ from katana450.resources import URDF_PATH
 from katana450.server.view.paint import PaintNodes, Tint
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scenery import add_table
+from katana450.srgb import to_light
+from tests.viser_bridge import internals
 from tests.viser_bridge.internals import nodes
 
 
@@ -142,3 +148,57 @@ def test_viser_accepts_the_coats(robot: Robot, state: State, server: viser.Viser
     tint.follow(touching(state, "wrist_link", "cup"))
     tint.follow(state)
     assert not nodes(server)["/cup/contact0"].visible
+
+
+# trimesh has no types for materials.
+library: Any = trimesh
+
+URDF = """<robot name="colours">
+  <link name="base"><visual><geometry><mesh filename="two.dae" scale="2 2 -2"/></geometry></visual>
+    <visual><geometry><box size="1 1 1"/></geometry>
+      <material name="red"><color rgba="1 0.5 0 1"/></material></visual></link>
+  <link name="tip"><visual><geometry><mesh filename="ball.stl"/></geometry></visual></link>
+  <joint name="turn" type="continuous"><parent link="base"/><child link="tip"/></joint>
+</robot>"""
+
+
+def painted(mesh: Any, colour: tuple[int, int, int, int]) -> Any:
+    material = library.visual.material.PBRMaterial(name=str(colour), baseColorFactor=colour)
+    mesh.visual = library.visual.TextureVisuals(material=material)
+    return mesh
+
+
+def test_materials_and_normals_of_each_shape_are_drawn(
+    server: viser.ViserServer, tmp_path: Path
+) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    (tmp_path / "ball.stl").write_bytes(ball.export(file_type="stl"))
+    parts = [painted(ball.copy(), (250, 10, 10, 255)), painted(ball.copy(), (10, 10, 250, 255))]
+    parts[1].apply_translation((5.0, 0.0, 0.0))
+    (tmp_path / "two.dae").write_bytes(library.exchange.dae.export_collada(parts))
+    (tmp_path / "arm.urdf").write_text(URDF)
+    robot = load(tmp_path / "arm.urdf")
+
+    path = ArmNodes(server, robot).path
+    for link in robot.links:
+        drawn = [
+            mesh
+            for number in range(len(link.visuals))
+            for mesh in _meshes(server, f"{path[link.name]}/shape{number}")
+        ]
+        assert len(drawn) == len(link.shapes)
+        for mesh, shape in zip(drawn, link.shapes, strict=True):
+            factor = mesh.visual.material.baseColorFactor[:3] / 255.0
+            np.testing.assert_allclose(factor, to_light(shape.material.colour), atol=0.5 / 255.0)
+            np.testing.assert_allclose(mesh.vertices, shape.vertices, atol=1e-6)
+            np.testing.assert_allclose(mesh.vertex_normals, shape.normals, atol=1e-6)
+            np.testing.assert_array_equal(mesh.faces, shape.faces)
+    (sphere,) = robot.links[1].shapes
+    # Neighbouring triangles share their corners and with them their normals.
+    assert len(sphere.vertices) == len(ball.vertices)
+
+
+def _meshes(server: viser.ViserServer, path: str) -> list[Any]:
+    node: Any = internals.nodes(server)[path]
+    scene = trimesh.load_scene(io.BytesIO(node.glb_data), file_type="glb", process=False)
+    return list(scene.geometry.values())

@@ -8,7 +8,7 @@ import pytest
 import viser
 
 from katana450.arm.control.session.session import Session
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.server.view.controls import listener
 from katana450.server.view.panel import PoseForm
 from katana450.server.view.readout import BASE, SHOULDER

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.session.session import Session
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.controls import ends
 from katana450.server.view.readout import BASE, SHOULDER, PoseDisplay, page

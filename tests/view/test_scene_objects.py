@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 import trimesh
 import viser
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.environment import Environment
@@ -18,13 +20,16 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.solid import ObjectAppearance
 from katana450.arm.control.state.state import Finding, Reason, State
-from katana450.arm.robot.creases import drawn, glb
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import drawn, glb
 from katana450.extensions.importers.formats.mesh_file import read_mesh
-from katana450.extensions.objects.handles import ObjectHandles
+from katana450.extensions.objects.handles import HandlesLayer
 from katana450.maths.water.environment import TableTop
+from katana450.server.view.layer import LayerContext
 from katana450.server.view.paint import Tint
+from katana450.server.view.scene import COAT_THICKNESS, DETAIL, coarse, surface
 from katana450.server.view.scene_objects import SceneObjectNodes
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
@@ -144,7 +149,10 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
     gestures = RecordedGestures()
     put = gestures.commands
     around = Environment(None, None, TableTop((-0.25, 0.75), (-0.7, 0.7), -0.025))
-    nodes = ObjectHandles(server, around, gestures)
+    nodes = HandlesLayer()
+    session_of_handles: Any = SimpleNamespace(environment=around)
+    arm: Any = None
+    nodes.attach(LayerContext(server, arm, session_of_handles, arm, gestures))
     cup = SceneObject("cup", Shape.CYLINDER, (0.032, 0.09), np.eye(4), can_be_held=True)
     nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), cup))
     shown: list[str] = []
@@ -170,3 +178,38 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
     assert len(put) == 2
     assert "nothing carries it there" in shown[0]
     assert tuple(nodes._handles["cup"].position) == (0.74, 0.1, 0.0)
+
+
+@settings(max_examples=30)
+@given(st.floats(5e-3, 0.05), st.integers(0, 4))
+def test_coarse_shape_is_near_the_fine_one(cell: float, subdivisions: int) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=0.1)
+    vertices, faces = coarse(ball.vertices, ball.faces, cell)
+    assert len(faces) <= len(ball.faces)
+    assert (np.abs(np.linalg.norm(vertices, axis=1) - 0.1) < np.sqrt(3.0) * cell).all()
+    # Every face has three different corners, and no two faces coincide.
+    corners = np.sort(faces, axis=1)
+    assert (np.diff(corners, axis=1) > 0).all()
+    assert len(np.unique(corners, axis=0)) == len(faces)
+    assert faces.max(initial=0) < len(vertices)
+
+
+def test_distant_corners_are_unchanged() -> None:
+    cube = trimesh.creation.box((0.1, 0.2, 0.3))
+    vertices, faces = coarse(cube.vertices, cube.faces, 1e-3)
+    assert sorted(map(tuple, vertices.round(12))) == sorted(map(tuple, cube.vertices.round(12)))
+    assert trimesh.Trimesh(vertices, faces).volume == cube.volume
+
+
+def test_ghost_keeps_the_outline_of_the_arm(robot: Robot) -> None:
+    before = after = 0
+    for body in robot.links:
+        for visual in body.visuals:
+            vertices, faces = surface(visual)
+            fine = visual.mesh
+            before += len(fine.faces)
+            after += len(faces)
+            for end in (np.min, np.max):
+                gap = end(vertices, axis=0) - end(fine.vertices, axis=0)
+                assert np.abs(gap).max() < DETAIL + 2.0 * COAT_THICKNESS
+    assert after < 0.7 * before

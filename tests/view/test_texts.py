@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.session.tool_targets import BranchMetrics, BranchOption
+from katana450.arm.control.session.tool_targets import BranchOption
 from katana450.arm.control.state.messages import (
     AXIS_NAMES,
     PRIORITIES,
@@ -26,7 +26,7 @@ from katana450.arm.control.state.messages import (
     title,
 )
 from katana450.arm.control.state.state import Finding, Reason, State, Status
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.server.view.panel import HEADINGS, cells_of
 from katana450.server.view.view import GHOST_COLOURS
@@ -141,18 +141,16 @@ def test_branch_cells_have_three_texts(
     expected: str,
 ) -> None:
     contact = None if parts is None else Contact(parts, 0.001, np.zeros((2, 3)), np.eye(3)[2])
-    cost = BranchMetrics(
-        BRANCHES[0], state.q, True, position_error, rotation_error, math.radians(90), 1.318, 0.1512
-    )
-    choice = BranchOption(cost, contact)
+    errors, cost = (position_error, rotation_error), (math.radians(90), 1.318, 0.1512)
+    choice = BranchOption(BRANCHES[0], state.q, True, *errors, *cost, contact)
     assert cells_of(choice) == (expected, "90°, 1.3 s", "0.151")
     assert len(HEADINGS) == 1 + len(cells_of(choice))
 
 
 def test_branch_that_the_limits_exclude_has_their_axes_in_place_of_numbers(state: State) -> None:
-    cost = BranchMetrics(BRANCHES[0], state.q, True, 0.0, 0.0, 0.0, 0.0, 0.1)
     for axes, expected in (((2,), "limits of axis 3"), ((0, 2, 3), "limits of axes 1, 3 and 4")):
-        choice = BranchOption(cost, None, excluded("back-up", axes))
+        refusal = excluded("back-up", axes)
+        choice = BranchOption(BRANCHES[0], state.q, True, *(0.1,) * 5, None, refusal)
         assert cells_of(choice) == (expected, "–", "–")
         assert "exclude the branch back-up" in choice.refusal
 

@@ -12,10 +12,9 @@ import viser
 
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.loop_timing import LoopTiming
-from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
+from katana450.arm.runtime.pipes.state_publisher import LoopTiming, Snapshot, StatePublisher
 from katana450.server.view import readout
 from katana450.server.view.panel import Panel
 from katana450.server.view.readout import PoseDisplay

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 from viser import _messages as wire
 
-from katana450.extensions.conduit.rings import ring
+from katana450.extensions.conduit import ring
 from katana450.server.viser_bridge.posing import arrange, place, turn
 from tests.viser_bridge.internals import sent
 

@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.control.commands.commands import Command, Joint, Stop
 from katana450.arm.control.session.session import Session
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

@@ -11,13 +11,35 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
+from katana450.extensions.programs.steps.pouring import flow_at, spill_tilt, tilt_for
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import Basin, WaterEnvironment
-from katana450.maths.water.flow import VesselMove, Water, WaterFlow
-from katana450.maths.water.lip import DROP_VOLUME
+from katana450.maths.water.flow import (
+    DISCHARGE,
+    DROP_VOLUME,
+    LANDAU_LEVICH,
+    VesselMove,
+    Water,
+    WaterFlow,
+    drained_film,
+    left_over,
+    viscous_flow,
+    weir_flow,
+    withdrawn_thickness,
+)
 from katana450.maths.water.parcel import Parcel
-from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, counted
+from katana450.maths.water.units import (
+    DENSITY,
+    FEMTOLITRE,
+    GRAVITY,
+    MILLILITRE,
+    ML,
+    REST_FLOW,
+    SURFACE_TENSION,
+    VISCOSITY,
+    counted,
+)
 from katana450.maths.water.vectors import Vector
 from tests.geometry.strategies import points, repeatable, rotation_vectors
 from tests.water.motions import (
@@ -250,3 +272,121 @@ def test_bad_numbers_are_refused(flow: WaterFlow) -> None:
         flow.step(water, {"cup": VesselMove(np.eye(4))}, -0.01)
     with pytest.raises(InputError, match="time step"):
         flow.step(water, {"cup": VesselMove(np.eye(4))}, math.inf)
+
+
+RADIUS, TILT, HEAD = 0.03, 1.0, 0.002
+
+
+def along_the_lip(rule: float, power: float) -> float:
+    """Return the flow [m^3/s] by quadrature: ``rule`` times the local head to ``power``."""
+    x = (np.arange(200_000) + 0.5) * (RADIUS / 200_000)
+    height = np.maximum(HEAD - x**2 * np.sin(TILT) / (2.0 * RADIUS), 0.0)
+    return 2.0 * RADIUS * rule * float((height**power).mean())
+
+
+def test_flows_are_the_integrals_over_the_lip() -> None:
+    weir = along_the_lip(2.0 / 3.0 * DISCHARGE * np.sqrt(2.0 * GRAVITY), 1.5)
+    assert weir_flow(RADIUS, TILT, HEAD, GRAVITY) == pytest.approx(weir, rel=1e-4)
+    film = along_the_lip(DENSITY * GRAVITY / (3.0 * VISCOSITY), 3.0)
+    assert viscous_flow(RADIUS, TILT, HEAD, GRAVITY) == pytest.approx(film, rel=1e-4)
+
+
+@repeatable
+@given(st.floats(1e-8, 1e-4), st.floats(1e-8, 1e-4), st.integers(1, 40))
+def test_many_steps_leave_what_one_leaves(weir: float, viscous: float, count: int) -> None:
+    """One of the two laws holds alone, and its flow falls with the volume."""
+    start, dt = 20 * MILLILITRE, 0.01
+    for flows, power in (((weir, 1e3), 2.0), ((1e3, viscous), 3.5)):
+        once = left_over(start, *flows, count * dt)
+        left = start
+        for _ in range(count):
+            fallen = (left / start) ** power
+            if left:
+                left = left_over(left, flows[0] * fallen, flows[1] * fallen, dt)
+        assert left == pytest.approx(once, rel=1e-6, abs=MILLILITRE // 10)
+
+
+@repeatable
+@given(st.floats(0.1, 20.0), st.floats(20.0, 220.0))
+def test_tilt_for_a_flow_has_that_flow(flow: WaterFlow, rate: float, volume: float) -> None:
+    cup = flow.water_environment.cup.inside
+    tilt = tilt_for(rate * ML, volume * ML, cup)
+    assert flow_at(tilt, volume * ML, cup) == pytest.approx(rate * ML, rel=1e-5)
+    assert tilt > spill_tilt(cup, volume * ML) - 1e-9
+
+
+WIDTH, LENGTH = 0.19, 0.1
+"""[m] Wall of the cup, unrolled."""
+
+
+def film_of_age(age: float) -> float:
+    """Return the volume [m^3] of Jeffreys' film by quadrature of its profile."""
+    z = (np.arange(20_000) + 0.5) * (LENGTH / 20_000)
+    h = np.sqrt(VISCOSITY * z / (DENSITY * GRAVITY * age))
+    return float(h.mean()) * WIDTH * LENGTH
+
+
+@repeatable
+@given(st.floats(0.1, 20.0), st.floats(0.0, 100.0))
+def test_film_drains_as_the_profile_of_jeffreys(age: float, dt: float) -> None:
+    left = drained_film(film_of_age(age), WIDTH, LENGTH, GRAVITY, dt)
+    assert left == pytest.approx(film_of_age(age + dt), rel=1e-5)
+
+
+@repeatable
+@given(st.floats(0.1, 10.0), st.lists(st.floats(0.0, 5.0), min_size=1, max_size=5))
+def test_many_steps_are_as_one(age: float, steps: list[float]) -> None:
+    whole = once = film_of_age(age)
+    for dt in steps:
+        once = drained_film(once, WIDTH, LENGTH, GRAVITY, dt)
+    assert once == pytest.approx(drained_film(whole, WIDTH, LENGTH, GRAVITY, sum(steps)), rel=1e-12)
+
+
+def test_old_film_rests_and_a_covered_wall_has_none() -> None:
+    young, old = 60.0, 90.0
+    film = film_of_age(old)
+    assert drained_film(film, WIDTH, LENGTH, GRAVITY, 10.0) == film
+    assert 0.5 * REST_FLOW < 0.5 * film / old < REST_FLOW
+    film = film_of_age(young)
+    assert drained_film(film, WIDTH, LENGTH, GRAVITY, 10.0) < film
+    assert drained_film(1e-6, WIDTH, 0.0, GRAVITY, 0.01) == 0.0
+    assert drained_film(0.0, WIDTH, LENGTH, GRAVITY, 0.01) == 0.0
+
+
+def test_withdrawal_follows_landau_levich_or_derjaguin() -> None:
+    slow, fast = 1e-3, 200.0
+    length = math.sqrt(SURFACE_TENSION / (DENSITY * GRAVITY))
+    capillary = VISCOSITY * slow / SURFACE_TENSION
+    thin = withdrawn_thickness(slow, GRAVITY)
+    assert thin == pytest.approx(LANDAU_LEVICH * length * capillary ** (2.0 / 3.0))
+    # A millimetre per second leaves less than two micrometres of water.
+    assert 1e-6 < thin < 2e-6
+    thick = withdrawn_thickness(fast, GRAVITY)
+    assert thick == pytest.approx(math.sqrt(VISCOSITY * fast / (DENSITY * GRAVITY)))
+
+
+def test_film_moves_between_wall_and_cup_without_loss(flow: WaterFlow) -> None:
+    water = flow.begin(1.5e-4, over_basin(flow.water_environment, 0.0))
+    films = []
+
+    def tilt(t: float) -> float:
+        """Tilt for four seconds, then stand again."""
+        return min(t, 1.3) if t < 4.0 else max(1.3 - 0.5 * (t - 4.0), 0.0)
+
+    for after in poured(flow, water, tilt, 8.0, 0.02):
+        assert after.total == water.total
+        assert after.cup.film >= 0
+        films.append(after.cup.film / MILLILITRE)
+        water = after
+    # The cup stands again; the film drains into it.
+    assert max(films) > films[-1] > 0.0
+    assert films[-1] < films[-20]
+    assert flow.film_rests(water.cup) is False
+
+
+def test_carried_cup_has_no_film(flow: WaterFlow) -> None:
+    water = flow.begin(1.5e-4, over_basin(flow.water_environment, 0.0))
+    for k in range(100):
+        pull = (1.5 * math.sin(0.05 * k), 0.0, 0.0)
+        water = flow.step(water, {"cup": VesselMove(water.cup.T, pull)}, 0.01)
+    assert water.cup.film == 0

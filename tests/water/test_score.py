@@ -7,8 +7,7 @@ import math
 import pytest
 
 from katana450.extensions.programs.script.measures import water_measures
-from katana450.maths.water.flow import VesselMove, WaterFlow
-from katana450.maths.water.motion import Course
+from katana450.maths.water.flow import Course, VesselMove, WaterFlow
 from katana450.maths.water.units import MILLILITRE
 from tests.water.motions import over_basin, poured, turned_to
 

@@ -13,13 +13,12 @@ from hypothesis import strategies as st
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.flow import WaterFlow, WaterSurface
-from katana450.maths.water.parcel import THICKNESS, Parcel, landing
+from katana450.maths.water.parcel import Parcel, landing
 from katana450.maths.water.surface import (
     BODY_FACES,
     SIDES,
     STREAM_FACES,
     Faces,
-    blob,
     body,
     disc,
     stream,
@@ -104,13 +103,5 @@ def test_interrupted_stream_has_zero_width_there() -> None:
     assert (spread[1:-1][(age[1:-1] < 0.1) | (age[1:-1] > 0.21)] > 0.0).all()
 
 
-def test_disc_and_blob_have_their_stated_size() -> None:
+def test_disc_has_its_stated_size() -> None:
     assert trimesh.Trimesh(*disc(), process=False).area == pytest.approx(math.pi, rel=0.005)
-    corners, faces = blob()
-    mesh = trimesh.Trimesh(corners, faces, process=False)
-    outline = corners[corners[:, 2] == 0.0]
-    x, y = outline[:, 0], outline[:, 1]
-    area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
-    assert area == pytest.approx(math.pi, rel=0.02)
-    assert corners[:, 2].max() == THICKNESS
-    assert (mesh.face_normals[:, 2] > 0.0).all()

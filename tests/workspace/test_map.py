@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.extensions.reachability import reachability as map_module
 from katana450.extensions.reachability.reachability import FAMILY, Reachability, reachability_map
 

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.extensions.reachability.reachability import Reachability
 from katana450.maths.geometry import screws
 from katana450.maths.geometry.arrays import FloatArray

@@ -17,13 +17,10 @@ from functools import cache, partial
 from multiprocessing.connection import Connection
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.session.silence import SilenceProfile
-from katana450.arm.control.state.restart import at_rest, restarted
+from katana450.arm.control.session.stopping import SilenceProfile, at_rest, restarted
 from katana450.arm.control.state.state import State
-from katana450.arm.drivers.driver import Driver
-from katana450.arm.drivers.simulated import SimulatedDriver
-from katana450.arm.robot.initial_scene import InitialScene
-from katana450.arm.robot.object_meshes import Meshes
+from katana450.arm.drivers.driver import Driver, SimulatedDriver
+from katana450.arm.robot.object_meshes import InitialScene, Meshes
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop

@@ -9,7 +9,6 @@ from threading import Event
 
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.detour_planner import DetourPlanner
 from katana450.arm.runtime.pipes.arm_roles import FRONT
 from katana450.arm.runtime.pipes.front_end import FrontEnd
 from katana450.arm.runtime.pipes.private_listener import Greeting, connect, connect_when_ready
@@ -69,7 +68,6 @@ class Frontend:
             added,
             meshes,
         )
-        self._detours: DetourPlanner | None = None
 
     def start(self) -> None:
         """Attach the arm to the gateway, which is started, add the panel, and start the view.
@@ -85,19 +83,14 @@ class Frontend:
             planning_worker = PlanningWorker(session, pipe.state_publisher, pipe)
             planning_worker.notify = gateway.announce
             planning_worker.redirected = guarded(hub.runner.redirected)
-            self._detours = DetourPlanner(session, pipe.state_publisher, planning_worker)
         pipe.start()
         gateway.attach(ArmHandle(robot, session, pipe, planning_worker, nodes))
-        if self._detours is not None:
-            self._detours.start()
         self.view.add_panel(partial(_folders, gateway, self._config.options, robot, pipe))
         self.view.start()
 
     def stop(self) -> None:
-        """End the view and the planner."""
+        """End the view."""
         self.view.stop()
-        if self._detours is not None:
-            self._detours.stop()
 
 
 def _folders(

@@ -70,7 +70,7 @@ def _run(
     supervisor: SupervisorPipe,
 ) -> None:
     # These imports take a third of a second. The page loads meanwhile.
-    from katana450.arm.control.actor import SERVER
+    from katana450.arm.control.lease import SERVER
     from katana450.arm.robot.object_meshes import Meshes
     from katana450.assembly.gateway import Gateway
     from katana450.server.viser_bridge.viser_server import close_server

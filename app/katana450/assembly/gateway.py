@@ -25,7 +25,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.lease import CommandChannel
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.assembly.page_routes import signed_in
 from katana450.assembly.web_server import WebServer

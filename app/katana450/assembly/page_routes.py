@@ -24,7 +24,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.lease import CommandChannel
 from katana450.disk_cache import kept
 from katana450.server.service.identity import Identity
 from katana450.server.service.limits import TokenBucket

@@ -10,10 +10,9 @@ from katana450.arm.control.objects.environment import Hand
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.robot.arm_reader import OtherArm
-from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table
 from katana450.arm.robot.props import load_props, water_environment
-from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.robot import Robot, bare
 from katana450.arm.robot.urdf import Urdf
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError

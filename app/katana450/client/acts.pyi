@@ -27,19 +27,6 @@ def documentation_of(kind: type[msgspec.Struct]) -> str: ...
 def add_method(owner: type, name: str, kind: type[msgspec.Struct], way: str) -> None: ...
 
 class Acts(Generic[AtRest, Answered, Sent]):
-    def operate_arm(self, act: ArmAct, confirmed: bool = ...) -> Answered:
-        """Connect, calibrate or switch the motors of a real arm. It must be stopped and at rest.
-
-        The state lists the acts that are possible; its ``arm.mode`` tells what becomes of an act.
-
-        Args:
-            act: connect; disconnect; calibrate: the arm moves to its mechanical stops; engage: the
-                motors hold the arm, which was calibrated before; release: motors off, the arm falls;
-                unblock: hold again after a collision or an error.
-            confirmed: Whether a person has confirmed the hazard. Without it, an act that has one is
-                refused with the text of the hazard.
-        """
-
     def joint(self, axis: int, value: float) -> AtRest:
         """Move one joint to a value.
 
@@ -97,18 +84,11 @@ class Acts(Generic[AtRest, Answered, Sent]):
     def go_to_zero(self) -> AtRest:
         """Move to the zero posture, in which the arm is stretched along x."""
 
-    def branch(
-        self,
-        shoulder: Literal["front", "back"] | None = ...,
-        elbow: Literal["up", "down"] | None = ...,
-        name: str | None = ...,
-    ) -> AtRest:
+    def branch(self, name: str) -> AtRest:
         """Move to the target pose on another branch: with another shoulder or elbow.
 
         Args:
-            shoulder: Shoulder of the branch of a five-axis arm.
-            elbow: Elbow of the branch of a five-axis arm.
-            name: Name of the branch, in place of shoulder and elbow; the answer ``branches`` has it.
+            name: Name of the branch; the answer ``branches`` has it.
         """
 
     def hold(self) -> AtRest:
@@ -130,6 +110,19 @@ class Acts(Generic[AtRest, Answered, Sent]):
 
         Args:
             value: Fraction of full speed.
+        """
+
+    def operate_arm(self, act: ArmAct, confirmed: bool = ...) -> Answered:
+        """Connect, calibrate or switch the motors of a real arm. It must be stopped and at rest.
+
+        The state lists the acts that are possible; its ``arm.mode`` tells what becomes of an act.
+
+        Args:
+            act: connect; disconnect; calibrate: the arm moves to its mechanical stops; engage: the
+                motors hold the arm, which was calibrated before; release: motors off, the arm falls;
+                unblock: hold again after a collision or an error.
+            confirmed: Whether a person has confirmed the hazard. Without it, an act that has one is
+                refused with the text of the hazard.
         """
 
     def fill(self, ml: float) -> Answered:

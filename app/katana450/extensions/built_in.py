@@ -170,7 +170,7 @@ EXTENSIONS = (
     ),
     Extension(
         "xacro",
-        prepare=f"{HERE}.xacro.arguments:expand_with_arguments",
+        prepare=f"{HERE}.xacro.xacro_file:expand_with_arguments",
     ),
     Extension(
         "objects",
@@ -178,7 +178,7 @@ EXTENSIONS = (
         handler=f"{HERE}.objects.object_requests:ObjectRequests",
     ),
     Extension("undo", handler=f"{HERE}.undo:UndoRequests"),
-    Extension("conduit", view_layer=f"{HERE}.conduit.rings:ConduitLayer"),
+    Extension("conduit", view_layer=f"{HERE}.conduit:ConduitLayer"),
     Extension("water", view_layer=f"{HERE}.water:WaterLayer"),
 )
 """Each with where its parts are, so that nothing is imported before it is used."""

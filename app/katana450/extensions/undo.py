@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.lease import Actor
 from katana450.arm.control.state.scene_objects import SceneObject, named, same
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError

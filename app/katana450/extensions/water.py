@@ -11,13 +11,12 @@ from katana450.arm.control.state.state import State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
-from katana450.maths.water.parcel import landing
+from katana450.maths.water.parcel import THICKNESS, landing
 from katana450.maths.water.surface import (
     BODY_FACES,
     COLOUR,
     STREAM_FACES,
     Faces,
-    blob,
     body,
     disc,
     stream,
@@ -83,9 +82,10 @@ def parts_of(water: Water, water_environment: WaterEnvironment) -> list[WaterPar
         corners = corners * (radius, radius, level) + (x, y, z + basin.floor)
         parts.append(WaterPart("basin", corners, faces, IN_VESSEL))
     for number, puddle in enumerate(water.puddles):
-        corners, faces = blob()
-        scale = puddle.radius, puddle.radius, min(puddle.radius / FLAT, 1.0)
-        parts.append(WaterPart(f"puddle{number}", corners * scale + puddle.at, faces, ON_TABLE))
+        corners, faces = disc()
+        thickness = THICKNESS * min(puddle.radius / FLAT, 1.0)
+        corners = corners * (puddle.radius, puddle.radius, thickness) + puddle.at
+        parts.append(WaterPart(f"puddle{number}", corners, faces, ON_TABLE))
     return parts
 
 

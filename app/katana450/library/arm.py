@@ -14,7 +14,7 @@ import numpy.typing as npt
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_files import read_robot
 from katana450.assembly.robot_session import find_robot

@@ -21,7 +21,7 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.errors import ConfigurationError, InputError
-from katana450.extensions.conduit.rings import ConduitLayer
+from katana450.extensions.conduit import ConduitLayer
 from katana450.extensions.water import WaterLayer
 from katana450.library.motion_plan import MotionPlan
 from katana450.maths.geometry.arrays import FloatArray

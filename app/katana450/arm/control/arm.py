@@ -1,17 +1,63 @@
-"""Model of the arm for the session: a kinematic chain, its tool frames and its gripper."""
+"""What a session drives: an arm with its tools and gripper, or the joints of another mechanism."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
-from katana450.arm.control.objects.gripper_model import GripperModel
+import numpy as np
+
 from katana450.arm.control.tool_kinematics import FiveAxisTool, ToolKinematics
 from katana450.caching import cached_property
 from katana450.errors import InputError
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.motion.limiter import Limits
+
+
+@dataclass(frozen=True)
+class GripperModel:
+    """The driven finger joint: its closed and its open end [rad] and maximum speed [rad/s].
+
+    The numbers of a sliding joint are in m and m/s. An arm without fingers has an empty range.
+    """
+
+    closed: float
+    opened: float
+    speed: float
+    slides: bool = False
+
+    @property
+    def lower(self) -> float:
+        """Lower end of the range [rad or m]."""
+        return min(self.closed, self.opened)
+
+    @property
+    def upper(self) -> float:
+        """Upper end of the range [rad or m]."""
+        return max(self.closed, self.opened)
+
+    @property
+    def moves(self) -> bool:
+        """True if the finger joint has a range."""
+        return self.closed != self.opened
+
+    def wider(self, value: float, by: float) -> float:
+        """Return the value at which the fingers are wider open than at ``value`` [rad or m]."""
+        return value + by if self.opened > self.closed else value - by
+
+    def is_wider(self, one: float, other: float) -> bool:
+        """Return whether the fingers are wider open at ``one`` than at ``other`` [rad or m]."""
+        return one > other if self.opened > self.closed else one < other
+
+    def clamp(self, value: float) -> float:
+        """Return the value inside the limits that is nearest to ``value`` [rad or m]."""
+        return min(max(value, self.lower), self.upper)
+
+
+NO_GRIPPER = GripperModel(0.0, 0.0, 0.0)
+
 
 SPEED_RISE_TIME = 0.9
 """[s] Time until a joint reaches its maximum speed, as in the faster of the two settings of the
@@ -96,3 +142,60 @@ def limits_of(
     """
     acceleration = speed / SPEED_RISE_TIME if acceleration is None else acceleration
     return Limits(lower, upper, speed, acceleration, acceleration / ACCELERATION_RISE_TIME)
+
+
+@dataclass(frozen=True, eq=False)
+class JointSet:
+    """The driven joints of a mechanism, which follow no other joint.
+
+    Attributes:
+        names: name of each joint, in the order of every joint vector.
+        slides: whether each joint is prismatic; its numbers are in m then, else in rad.
+        lower, upper, speed: (n,) limits.
+        why: a sentence on why no tool of the mechanism can be brought to a pose.
+    """
+
+    names: tuple[str, ...]
+    slides: tuple[bool, ...]
+    lower: FloatArray
+    upper: FloatArray
+    speed: FloatArray
+    why: str
+
+    arm: ClassVar[None] = None
+
+    @property
+    def n(self) -> int:
+        """Number of driven joints."""
+        return len(self.names)
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of position, speed, acceleration and jerk of the joints."""
+        return limits_of(self.lower, self.upper, self.speed)
+
+    @property
+    def refusal(self) -> str:
+        """The refusal of a command about a tool, in sentences."""
+        return f"Only its joints can be driven. {self.why}"
+
+    @property
+    def gripper(self) -> GripperModel:
+        """No gripper: the fingers are joints like any other."""
+        return NO_GRIPPER
+
+    @property
+    def ready(self) -> FloatArray:
+        """The posture (n,) with all joints at zero, or at the limit nearest to zero."""
+        return self.clamp(np.zeros(self.n))
+
+    def clamp(self, q: FloatArray) -> FloatArray:
+        """Return the posture inside the limits that is nearest to ``q`` (n,)."""
+        return frozen(np.clip(q, self.lower, self.upper))
+
+    def check(self, q: FloatArray) -> None:
+        """Raise InputError unless ``q`` has n numbers."""
+        if q.shape != (self.n,):
+            raise InputError(
+                f"This mechanism has {self.n} driven joints, but the command has {q.size}."
+            )

@@ -1,4 +1,4 @@
-"""The arm in a URDF: its five axes as an exact chain, with tools and fingers."""
+"""The arm in a URDF with its place in the robot: an exact chain, with base, tools and fingers."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.objects.gripper_model import NO_GRIPPER, GripperModel
+from katana450.arm.control.arm import NO_GRIPPER, ArmModel, GripperModel
 from katana450.arm.control.tool_kinematics import FiveAxisTool, ToolKinematics
 from katana450.arm.robot.link import Joint
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.structure import SLIDING, Structure, structure_of
 from katana450.arm.robot.urdf import Urdf, driver_of
 from katana450.errors import InputError, RobotDescriptionError
@@ -22,6 +21,52 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import exact_member
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MountedArm(ArmModel):
+    """An arm as part of a robot.
+
+    The control core uses it as an ``ArmModel``. ``ArmModel`` is a separate class because the core
+    knows neither base frames nor links.
+
+    Attributes:
+        T_base_shoulder: (4, 4) frame {S} in the root link, which stands on the table [m].
+        fingers: (factor, offset) of the finger joints, the driven one first:
+            value = factor * driven + offset [rad or m].
+        resting: value [rad or m] of every movable joint that the arm does not drive.
+        notes: sentences for a person on assumptions about the file.
+    """
+
+    T_base_shoulder: FloatArray
+    fingers: Mapping[str, tuple[float, float]]
+    resting: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+    def moves(self, joint: str) -> bool:
+        """Return whether the joint of that name is an axis or a finger."""
+        return joint in self.chain.names or joint in self.fingers
+
+    def ready(self, posture: Sequence[float]) -> FloatArray:
+        """Return the joint angles (n,) [rad] inside limits in which the arm starts.
+
+        ``posture``: (5,) [rad] of the canonical arm, for an arm of the five-axis family; for the
+        Katana these are its joint angles.
+        """
+        return self.kinematics.ready(posture, self.T_base_shoulder)
+
+    def joint_values(self, q: FloatArray, gripper: float) -> dict[str, float]:
+        """Return the value of every movable joint of the robot [rad or m].
+
+        Args:
+            q: (n,) angles of the axes [rad].
+            gripper: value of the driven finger joint [rad or m].
+        """
+        values = dict(zip(self.chain.names, (float(angle) for angle in q), strict=True))
+        for joint, (factor, offset) in self.fingers.items():
+            values[joint] = factor * gripper + offset
+        return {**values, **self.resting}
+
 
 PERPENDICULAR = 0.5
 """Cosine between two axes up to which they point neither in the same nor in opposite directions."""

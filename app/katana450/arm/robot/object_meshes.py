@@ -1,4 +1,4 @@
-"""Meshes of scene objects, found by their content: files, triangles and collision bodies."""
+"""Meshes of scene objects, found by their content, and the scene when the server starts."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.solid import Solid
-from katana450.arm.robot import creases
-from katana450.arm.robot.creases import Colours
+from katana450.arm.robot import surfaces
+from katana450.arm.robot.surfaces import Colours
 from katana450.atomic import write_files, writer_of
 from katana450.caching import cached_property
 from katana450.errors import InputError
@@ -77,9 +79,9 @@ class Mesh:
         return len(self.file) + self.vertices.nbytes + self.faces.nbytes
 
     @cached_property
-    def drawn(self) -> creases.Drawn:
+    def drawn(self) -> surfaces.Drawn:
         """Triangles of the mesh, for drawing."""
-        return creases.drawn(self.vertices, self.faces, self.colours)
+        return surfaces.drawn(self.vertices, self.faces, self.colours)
 
 
 class Meshes:
@@ -156,3 +158,17 @@ class Meshes:
     def _fits(self, meshes: dict[str, Mesh]) -> bool:
         total = sum(mesh.bytes for mesh in meshes.values())
         return len(meshes) <= self._limit and total <= self._max_bytes
+
+
+class InitialScene(NamedTuple):
+    """A scene in place of the robot's own.
+
+    Attributes:
+        command: Places its objects and its water.
+        joints: (n,) initial joint angles [rad]; None for the ready posture.
+        meshes: Meshes of its objects.
+    """
+
+    command: cmd.ReplaceScene
+    joints: FloatArray | None
+    meshes: tuple[Mesh, ...]

@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.control.joints import JointSet
+from katana450.arm.control.arm import NO_GRIPPER, JointSet
 from katana450.arm.control.state.messages import axis_label, axis_names
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.link import Joint, Link
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.visual import Visual
 from katana450.caching import cached_property
 from katana450.errors import InputError, RobotDescriptionError
+from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.kinematics.statics import LinkLoad
 
 LIMIT_TOLERANCE = 1e-9
 """[rad, m] Excess over a limit that is accepted."""
@@ -289,3 +291,71 @@ class Robot:
                 f"{high:g}. Set the lower below the upper limit."
             )
         return low, high
+
+
+FLANGE = "flange"
+"""The tool frame that remains."""
+
+
+def bare(robot: Robot) -> Robot:
+    """Return ``robot`` without the links that carry its fingers; the flange is its only tool.
+
+    Raises RobotDescriptionError if it has no arm, or no link of that name.
+    """
+    arm = robot.require_arm()
+    if FLANGE not in arm.tools:
+        raise RobotDescriptionError(
+            f"{robot.name} has no link {FLANGE!r}, which marks where its gripper begins."
+        )
+    chain = arm.chain_to(FLANGE)
+    parents = {link.name: link.parent for link in robot.links}
+    fingers = {link.name for link in robot.links if link.joint and link.joint.name in arm.fingers}
+    # The links between the fingers and the last axis of the arm are removed too.
+    carried = {link.name for link in robot.links if link.joint and link.joint.name in chain.names}
+    removed = set(fingers)
+    for name in fingers:
+        above = parents[name]
+        while above is not None and above not in carried:
+            removed.add(above)
+            above = parents[above]
+    links = []
+    for link in robot.links:
+        if link.name in removed or link.parent in removed:
+            removed.add(link.name)
+        else:
+            links.append(link)
+    bare_arm = replace(
+        arm,
+        chain=chain,
+        tools={FLANGE: arm.tools[FLANGE]},
+        default_tool=FLANGE,
+        gripper=NO_GRIPPER,
+        fingers={},
+    )
+    return replace(robot, links=tuple(links), arm=bare_arm)
+
+
+def loads_of(robot: Robot) -> tuple[LinkLoad, ...]:
+    """Return one load for each rigid group of the arm, with its fingers at zero.
+
+    Empty if the file states no mass, or if there is no arm.
+    """
+    arm = robot.arm
+    if arm is None:
+        return ()
+    T_shoulder_link: dict[str | None, FloatArray] = {None: se3.inverse(arm.T_base_shoulder)}
+    axes: dict[str | None, int] = {None: 0}
+    moments: dict[int, FloatArray] = {}
+    for link in robot.links:
+        T = T_shoulder_link[link.name] = T_shoulder_link[link.parent] @ link.at_rest(arm.resting)
+        turned = link.joint is not None and link.joint.name in arm.chain.names
+        count = axes[link.name] = axes[link.parent] + turned
+        if link.inertial is None:
+            continue
+        # The fourth entry is the mass itself.
+        moment = link.inertial.mass * (T @ link.inertial.T_link_inertia[:, 3])
+        moments[count] = moments.get(count, np.zeros(4)) + moment
+    return tuple(
+        LinkLoad(count, float(moment[3]), frozen(moment[:3] / moment[3]))
+        for count, moment in moments.items()
+    )

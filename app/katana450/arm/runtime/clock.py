@@ -1,23 +1,10 @@
-"""Clocks for the control loop, which runs on another clock in a test."""
+"""The clock of the control loop, in place of which a test has one that is set."""
 
 from __future__ import annotations
 
 import sys
 import time
 from threading import Event
-from typing import Protocol
-
-
-class Clock(Protocol):
-    """A monotonic clock."""
-
-    def now(self) -> float:
-        """Return the time since a fixed moment [s]."""
-        ...
-
-    def sleep_until(self, t: float, wake: Event | None = None) -> None:
-        """Return at ``t`` [s], or at once if that has passed, or as soon as ``wake`` is set."""
-        ...
 
 
 class MonotonicClock:

@@ -9,20 +9,23 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.commands.commands import OperateArm, Stop
-from katana450.arm.control.session.outcome import DROPPED
+from katana450.arm.control.lease import CommandChannel
+from katana450.arm.control.session.checks import DROPPED
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.session.silence import SilenceProfile
-from katana450.arm.control.session.stopping import with_name
+from katana450.arm.control.session.stopping import SilenceProfile, with_name
 from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import ACCEPTED, Finding, Reason, State, Verdict
 from katana450.arm.drivers.driver import Driver
-from katana450.arm.runtime.clock import Clock
-from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
+from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.mailbox import Drained, Mailbox
-from katana450.arm.runtime.outcomes import TicketOutcome
-from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
+from katana450.arm.runtime.pipes.state_publisher import (
+    LoopTiming,
+    Punctuality,
+    Snapshot,
+    StatePublisher,
+    TicketOutcome,
+)
 from katana450.arm.runtime.tick import TickRecord, failed, stepped, waited
 from katana450.platform_support import prefer_thread
 
@@ -42,7 +45,7 @@ class ControlLoop:
         session: Session,
         driver: Driver,
         mailbox: Mailbox,
-        clock: Clock,
+        clock: MonotonicClock,
         rate: float,
         held_up: float = math.inf,
         first: Callable[[State], State] | None = None,

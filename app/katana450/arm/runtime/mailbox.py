@@ -3,17 +3,41 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands.commands import ClearStop, Command, HoldFor, PauseFor, Stop
+from katana450.arm.control.lease import Actor
 from katana450.arm.control.session.stopping import joined
 from katana450.arm.control.state.stop_cause import StopCause
-from katana450.arm.runtime.pipes.presses import Presses
 from katana450.arm.runtime.tick import Submission
 from katana450.errors import InputError
+
+REMEMBERED = 256
+"""Number of presses of STOP whose repetitions are recognised."""
+
+
+class Presses:
+    """Recent presses of STOP, each of which counts once."""
+
+    def __init__(self) -> None:
+        self._counted: deque[str] = deque(maxlen=REMEMBERED)
+
+    def is_known(self, press: str | None) -> bool:
+        """Return whether ``press`` was counted. A press without a name is always new."""
+        return press is not None and press in self._counted
+
+    def counts(self, stop: Stop) -> bool:
+        """Remember the presses of ``stop``; return whether any is new.
+
+        A stop whose cause names no press always counts.
+        """
+        new = [press for press in stop.presses if press not in self._counted]
+        self._counted.extend(new)
+        return bool(new) or not stop.cause.press
+
 
 CAPACITY = 256
 """Maximum number of commands that wait for one tick: far more than people make in 10 ms, and few
@@ -24,7 +48,7 @@ class CommandSink(Protocol):
     """Receiver of commands, in this process or at the other end of a pipe.
 
     In the front end only ``CommandGate`` delivers commands. Behind it the planning threads add
-    the paths of its commands, and offers, which move nothing.
+    the paths of its commands.
     """
 
     @property

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from katana450.arm.control.actor import Actor, Grounds
 from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.lease import Actor, Grounds
 from katana450.arm.control.session.goals import START_TOLERANCE
 from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.session import Session
@@ -49,8 +49,6 @@ class PlanningWorker:
         """
         self.failure = ""
         """Reason for which no path was found, until the next command; empty without one."""
-        self.newest_actor: Actor | None = None
-        """The actor of the newest command that was not passive."""
 
     @property
     def last_ticket(self) -> int:
@@ -68,12 +66,11 @@ class PlanningWorker:
         self.failure = ""
         if not all(part.passive for part in traits):
             self.cancel()
-            self.newest_actor = actor
         # The hold for a driver who has left. A run that another person ordered is still wanted.
         left = actor is not None and actor.grounds is Grounds.SERVER and command == cmd.Hold()
         if any(part.supersedes for part in traits) and not left:
             self.redirected()
-        if command.traits.planned:
+        if isinstance(command, cmd.Branch):
             self._session.check(command)
             self._plan(command, actor)
             return self.last_ticket
@@ -86,7 +83,7 @@ class PlanningWorker:
                 self._work.set()
                 self._work = None
 
-    def _plan(self, command: cmd.Command, actor: Actor | None) -> None:
+    def _plan(self, command: cmd.Branch, actor: Actor | None) -> None:
         cancelled = threading.Event()
         with self._lock:
             self._work = cancelled
@@ -94,7 +91,7 @@ class PlanningWorker:
             target=self._find, args=(command, actor, cancelled), name="planning", daemon=True
         ).start()
 
-    def _find(self, command: cmd.Command, actor: Actor | None, cancelled: threading.Event) -> None:
+    def _find(self, command: cmd.Branch, actor: Actor | None, cancelled: threading.Event) -> None:
         waited = self._state_publisher.snapshot.state.waits
         try:
             state = self._at_rest(actor, cancelled)
@@ -113,20 +110,17 @@ class PlanningWorker:
                 if self._work is cancelled:
                     self._work = None
 
-    def _plan_of(self, command: cmd.Command, state: State) -> Plan | None:
+    def _plan_of(self, command: cmd.Branch, state: State) -> Plan | None:
         """Return the plan of ``command`` from the rest of ``state``; None if nothing has to move.
 
         Raises InputError if the arm cannot do it, and BlockedError without a clear path.
         """
         arm, world = self._session.require_arm(), self._session.world_at(state)
-        match command:
-            case cmd.Branch(full_name=name):
-                goal = with_branch(arm, state, branch_named(arm, name)).goal
-                # At a stretched elbow two branches are one posture, but for rounding.
-                if (np.abs(goal - state.setpoint) <= START_TOLERANCE).all():
-                    return None
-                return plan_to(arm, world, state, goal)
-        raise AssertionError(f"{type(command).__name__} is `planned`, and has no case here.")
+        goal = with_branch(arm, state, branch_named(arm, command.name)).goal
+        # At a stretched elbow two branches are one posture, but for rounding.
+        if (np.abs(goal - state.setpoint) <= START_TOLERANCE).all():
+            return None
+        return plan_to(arm, world, state, goal)
 
     def _fail(self, why: str) -> None:
         self.failure = why

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands.commands import Command
-from katana450.arm.control.session.outcome import FAILED
+from katana450.arm.control.lease import Actor
+from katana450.arm.control.session.checks import FAILED
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.modes import IDLE
 from katana450.arm.control.state.state import Finding, Reason, State

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from queue import Empty
 
-from katana450.arm.control.actor import SERVER
+from katana450.arm.control.lease import SERVER
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.assembly.event_log.record_maker import Record, RecordMaker, record
 from katana450.platform_support import claim_file, open_bytes

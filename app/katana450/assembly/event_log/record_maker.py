@@ -15,10 +15,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from katana450.arm.control.actor import SERVER, Actor, CommandChannel
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Act, Command, content_names
-from katana450.arm.control.state.event_log import LogEntry
+from katana450.arm.control.lease import SERVER, Actor, CommandChannel
+from katana450.arm.control.state.findings import LogEntry
 from katana450.arm.control.state.messages import finding_text
 from katana450.maths.planning.plan import Plan
 from katana450.server.service.limits import SenderBuckets, TokenBucket

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from functools import cache
-from typing import NamedTuple
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.joints import JointSet
 from katana450.arm.control.state.messages import UNCHECKED, short
-from katana450.arm.robot.collision import as_modelled, table, world_of
+from katana450.arm.robot.collision import Pieces, as_modelled, table, world_of
+from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
-from katana450.extensions.bodies.estimated_shapes import drawn, with_estimates
+from katana450.arm.robot.visual import ROD_LENGTH, PrimitiveShape, Visual
+from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.bodies.pairs_at_rest import (
     TOUCH_DISTANCE,
     RestPairs,
@@ -21,12 +23,11 @@ from katana450.extensions.bodies.pairs_at_rest import (
     pairs_at_rest,
 )
 from katana450.extensions.bodies.pieces import pieces
-from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.linkage import GROUND, Linkage
-from katana450.maths.collision.shape import half_space
+from katana450.maths.collision.shape import half_space, hull
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.settings import Settings
 
 
@@ -50,7 +51,7 @@ def robot_world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...], t
             findings.append(f"Not checked, because they touch at rest: {'; '.join(touching)}.")
         if robot.arm is not None:
             return CollisionWorld(linkage, parts, rest.checked, rest.close)
-        under = standing(linkage, parts, robot.joint_group)
+        under = standing(linkage, parts, _at_rest(robot))
         findings.extend(under.notes)
         return CollisionWorld(
             linkage,
@@ -144,9 +145,6 @@ def _size(part: Part) -> float:
 DEEP = -10.0
 """[m] Height of a plane below every robot, from which heights are measured."""
 
-MAX_NAMED = 4
-"""Maximum number of parts that a note names."""
-
 
 class Standing(NamedTuple):
     """The table under a robot.
@@ -162,61 +160,36 @@ class Standing(NamedTuple):
     notes: tuple[str, ...]
 
 
-def standing(linkage: Linkage, parts: Sequence[Part], joints: JointSet) -> Standing:
-    """Return the table of a robot whose x (k,) is that of ``joints`` and an unused number.
+def standing(linkage: Linkage, parts: Sequence[Part], x: FloatArray) -> Standing:
+    """Return the table of a robot that is at rest at ``x`` (k,).
 
-    The table is as high as the lowest point at rest, or z = 0 of the base if that is lower. If a
-    joint can move this point farther down, the robot hangs, and no table is known. Parts that touch
-    the table at rest are not checked against it.
+    The table is as high as z = 0 of the base, or as the lowest part that stands still if that is
+    lower. If a part that moves is still lower, nothing says where the robot stands, and no table is
+    known. Parts that touch the table at rest are not checked against it.
     """
-    rest = np.append(joints.ready, 0.0)
-    heights = _heights(linkage, parts, rest)
-    lowest = min(float(heights.min()), 0.0)
+    heights = _heights(linkage, parts, x)
+    fixed = np.array([part.mover == GROUND for part in parts])
+    lowest = min(float(heights[fixed].min(initial=0.0)), 0.0)
     if lowest > -TOUCH_DISTANCE:
         lowest = 0.0
-    feet = [
-        part for part, height in zip(parts, heights, strict=True) if height < lowest + MIN_CLEARANCE
-    ]
-    if lowest < 0.0:
-        lower = _lowered(linkage, feet, joints, lowest - MIN_CLEARANCE)
-        if lower:
-            why = f"{lower} is its lowest part at rest and can move farther down"
-            return Standing(
-                (),
-                RestPairs([], {}, []),
-                (f"No table is checked, because nothing says where the robot stands: {why}.",),
-            )
-    table = _table_at(lowest)
-    moving = [number for number, part in enumerate(parts) if part.mover != GROUND]
-    pairs = judged_at_rest(
-        linkage, (*parts, table), [(number, len(parts)) for number in moving], rest
-    )
-    notes = []
-    if lowest < 0.0:
-        under = _listed([part.name for part in feet])
-        notes.append(f"The table is {-1e3 * lowest:.0f} mm below the base, under {under}.")
-    touching = [parts[number].name for number, _ in pairs.touching]
+    if float(heights.min()) < lowest - TOUCH_DISTANCE:
+        part = parts[int(heights.argmin())].name
+        why = f"nothing says where the robot stands, and {part} is below its base at rest"
+        return Standing((), RestPairs([], {}, []), (f"No table is checked: {why}.",))
+    ground = _table_at(lowest)
+    over = [(number, len(parts)) for number in np.flatnonzero(~fixed).tolist()]
+    pairs = judged_at_rest(linkage, (*parts, ground), over, x)
+    notes = [f"The table is {-1e3 * lowest:.0f} mm below the base."] if lowest < 0.0 else []
+    touching = ", ".join(parts[number].name for number, _ in pairs.touching)
     if touching:
-        notes.append(f"Not checked against the table, which they touch: {_listed(touching)}.")
-    return Standing((table,), pairs, tuple(notes))
+        notes.append(f"Not checked against the table, which they touch: {touching}.")
+    return Standing((ground,), pairs, tuple(notes))
 
 
 def _table_at(height: float) -> Part:
     """Return the table as a half-space up to ``height`` [m]."""
     T = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, height))
     return obstacle("table", T, half_space())
-
-
-def _lowered(linkage: Linkage, feet: Sequence[Part], joints: JointSet, height: float) -> str:
-    """Return the name of one of ``feet`` that one joint moves below ``height`` [m], or ""."""
-    for axis, (low, high) in enumerate(zip(joints.lower, joints.upper, strict=True)):
-        for value in (low, 0.5 * (low + high), high):
-            x = np.append(joints.ready, 0.0)
-            x[axis] = value
-            heights = _heights(linkage, feet, x)
-            if float(heights.min()) < height:
-                return feet[int(heights.argmin())].name
-    return ""
 
 
 def _heights(linkage: Linkage, parts: Sequence[Part], x: FloatArray) -> FloatArray:
@@ -231,7 +204,74 @@ def _heights(linkage: Linkage, parts: Sequence[Part], x: FloatArray) -> FloatArr
     return heights
 
 
-def _listed(names: Sequence[str]) -> str:
-    """Return the names as words, with a count of those beyond MAX_NAMED."""
-    more = len(names) - MAX_NAMED
-    return ", ".join(names[:MAX_NAMED]) + (f" and {more} more" if more > 0 else "")
+RADIUS_RATIO, MAX_RADIUS = 0.1, 0.06
+"""Radius of a capsule, as a ratio [1] to the longest stick of the robot, and its maximum [m]."""
+
+
+def drawn(link: Link) -> tuple[Visual, ...]:
+    """Return the visuals of ``link`` without the sticks that represent missing ones."""
+    return tuple(visual for visual in link.visuals if not visual.is_rod)
+
+
+def with_estimates(robot: Robot, pieces: Pieces) -> tuple[Robot, frozenset[str]]:
+    """Return ``robot`` with shapes for all links that have a stick, and the links of unknown shape.
+
+    What is drawn replaces collision shapes that are missing. ``pieces``: see ``world_of``.
+    """
+    links, unknown = [], []
+    for link in robot.links:
+        visuals, collisions = link.visuals, link.collisions
+        if robot.collides and link.missing[1]:
+            collisions = (*collisions, *drawn(link))
+        if _is_unknown(robot, link, collisions, pieces):
+            unknown.append(link.name)
+            capsules = _capsules(robot, link)
+            if robot.collides:
+                collisions = (*collisions, *capsules)
+            elif capsules:
+                visuals = (*drawn(link), *capsules)
+        links.append(replace(link, visuals=visuals, collisions=collisions))
+    return replace(robot, links=tuple(links)), frozenset(unknown)
+
+
+def _is_unknown(robot: Robot, link: Link, collisions: Sequence[Visual], pieces: Pieces) -> bool:
+    """Return whether shapes of ``link`` for contacts are missing and not drawn, or unreadable."""
+    no_visuals, no_collisions = link.missing
+    if no_collisions and (no_visuals or not drawn(link)):
+        return True
+    if no_visuals and not robot.collides:
+        return True
+    try:
+        for shape in collisions if robot.collides else drawn(link):
+            for points in pieces(shape):
+                hull(points)
+    except (InputError, RobotDescriptionError):
+        return True
+    return False
+
+
+def _capsules(robot: Robot, link: Link) -> list[Visual]:
+    """Return a capsule along each stick from ``link`` to its children.
+
+    It begins inside the stick, so that a link that stands on the table does not reach into it. The
+    other end goes round the joint of the child.
+    """
+    lengths = [float(np.linalg.norm(member.T_parent_link[:3, 3])) for member in robot.links]
+    radius = min(RADIUS_RATIO * max(lengths), MAX_RADIUS)
+    ends = [child.T_parent_link[:3, 3] for child in robot.children(link)]
+    return [
+        Visual(frozen(np.eye(4)), frozen(np.ones(3)), None, make=partial(_capsule, end, radius))
+        for end in ends
+        if np.linalg.norm(end) > ROD_LENGTH
+    ]
+
+
+def _capsule(end: FloatArray, radius: float) -> Any:
+    """Return the corners, as a trimesh, of a capsule of ``radius`` round the stick to ``end`` [m].
+
+    end: (3,) in the frame of the link [m].
+    """
+    mesh = PrimitiveShape("icosphere", {"subdivisions": 1, "radius": radius}).mesh()
+    start = min(radius / float(np.linalg.norm(end)), 1.0) * end
+    mesh.faces, mesh.vertices = [], np.concatenate((mesh.vertices + start, mesh.vertices + end))
+    return mesh

@@ -16,7 +16,7 @@ from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
-from katana450.extensions.conduit.rings import ConduitLayer
+from katana450.extensions.conduit import ConduitLayer
 from katana450.extensions.export.playback import chosen
 from katana450.extensions.programs.server.traces import TracesLayer
 from katana450.extensions.progress import progress

@@ -21,8 +21,8 @@ from xml.etree.ElementTree import fromstring
 from katana450.arm.robot.description import checked
 from katana450.errors import ConfigurationError
 from katana450.extensions.derived_urdf import derived_urdf
-from katana450.extensions.xacro.ros_package import package_folder
 from katana450.extensions.xacro.xacro_file import expanded
+from katana450.extensions.xacro.xacro_process import package_folder
 from katana450.extras import library
 from katana450.resources import URDF_PATH
 

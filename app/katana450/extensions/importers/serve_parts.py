@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
     from katana450.arm.control.session.session import Session
-    from katana450.arm.robot.initial_scene import InitialScene
+    from katana450.arm.robot.object_meshes import InitialScene
     from katana450.server.web.http_api import RouteContext
 
 

@@ -12,8 +12,8 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.lease import CommandChannel
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import CancelledError, InputError, LeaseError
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError

@@ -29,7 +29,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import CurvePath, joint_derivatives, point_derivatives
-from katana450.maths.water.motion import MotionWithWater
+from katana450.maths.water.flow import MotionWithWater
 from katana450.maths.water.units import MILLILITRE
 
 PATH_SAMPLES = 2000

@@ -22,14 +22,12 @@ import numpy.typing as npt
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.creases import smooth_normals
 from katana450.arm.robot.props import Props, load_props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
+from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of, smooth_normals
 from katana450.arm.robot.visual import Visual
 from katana450.assembly.robot_session import find_robot
-from katana450.extensions.conduit.rings import poses, ring
-from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
+from katana450.extensions.conduit import ConduitStretch, poses, ring, stretches_of
 from katana450.extensions.media.picture import Camera, Item, Picture, Translucent, picture
 from katana450.extensions.water import WaterPart, parts_of
 from katana450.maths.geometry import so3

@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import viser
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands.commands import PlaceObject
-from katana450.arm.control.objects.environment import Environment
-from katana450.arm.control.objects.support import check_carried, is_loose
+from katana450.arm.control.lease import Actor
+from katana450.arm.control.objects.loose_objects import check_carried, is_loose
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import se3
-from katana450.server.view.controls import GestureGate, refuse
+from katana450.server.view.controls import refuse
 from katana450.server.view.layer import LayerContext, ViewLayer
 from katana450.server.view.scene import node_name
 from katana450.server.viser_bridge.guard import WORKSPACE
@@ -26,30 +25,15 @@ HANDLE = 0.09
 
 
 class HandlesLayer(ViewLayer):
-    """The handles as a layer of the scene, hidden; a page shows that of the object it selects."""
+    """One hidden handle for each scene object; a page shows that of the object it selects."""
 
     needs_arm = False
 
     def attach(self, context: LayerContext) -> None:
         """Prepare for the objects of a session."""
-        environment = context.session.environment
-        self._handles = ObjectHandles(context.server, environment, context.gestures)
-
-    def follow(self, state: State) -> None:
-        """Move the handles with the objects of ``state``."""
-        self._handles.follow(state)
-
-
-class ObjectHandles:
-    """One hidden handle for each scene object, which a page shows in its own window."""
-
-    def __init__(
-        self, server: viser.ViserServer, environment: Environment, gestures: GestureGate
-    ) -> None:
-        """Prepare for objects in ``environment``, moved by ``gestures``."""
-        self._server = server
-        self._environment = environment
-        self._gestures = gestures
+        self._server = context.server
+        self._environment = context.session.environment
+        self._gestures = context.gestures
         self._handles: dict[str, viser.TransformControlsHandle] = {}
         self._objects: dict[str, SceneObject] = {}
         self._seen: tuple[SceneObject, ...] = ()

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.loose_objects import check_carried, check_mounted, is_loose
 from katana450.arm.control.objects.pouring import BASIN, CUP, MAX_VESSELS, is_vessel
-from katana450.arm.control.objects.support import check_carried, check_mounted, is_loose
 from katana450.arm.control.state.scene_objects import (
     MAX_OBJECTS,
     Attachment,

@@ -21,9 +21,9 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands.act import ENVELOPE, Act, classes_of, tag_of
 from katana450.arm.control.commands.commands import Command
+from katana450.arm.control.lease import Actor
 from katana450.arm.control.state import modes
 from katana450.arm.control.state.solid import Solid
 from katana450.arm.control.state.state import State
@@ -87,6 +87,8 @@ class SharedValues:
         self._texts: dict[str, SharedText] = {}
         self._values: dict[str, Any] = {}
         self._new: list[SharedText] = []
+        self.detours: list[Any] = []
+        """Keys of the detours that states and commands of an older version offer."""
 
     def key(self, value: Any, text: Callable[[Any], bytes]) -> str:
         """Return the key of ``value``. ``text`` returns the form of a value that is not known."""
@@ -336,7 +338,7 @@ def _union(parts: Iterable[Any]) -> TextForm:
         if form is None and optional:
             return None
         if len(records) > 1 and isinstance(form, dict):
-            form = command_form(form) if commands else form
+            form = command_form(form, shared.detours) if commands else form
             name = form.get(TAG)
             # Before a field had several types, its objects had no tag.
             fit = [record for record in records.values() if record.has_form_of(form)]
@@ -392,7 +394,7 @@ class _Record:
             raise FormError(f"{shown(form)} is not an object of {name}")
         order = form.get(ORDER) if self.kind is Plan else None
         forms: dict[str, Any] = {}
-        for field, content in upgraded(self.kind, form).items():
+        for field, content in upgraded(self.kind, form, shared.detours).items():
             if field not in self.forms:
                 known = field == TAG or (field == ORDER and self.kind is Plan)
                 if known or FORMER.get(field) == content:

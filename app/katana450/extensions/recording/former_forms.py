@@ -12,10 +12,10 @@ from typing import Any
 
 from katana450.arm.control.commands.act import tag_of
 from katana450.arm.control.objects.pouring import CUP
-from katana450.arm.control.state.modes import Target
+from katana450.arm.control.state.modes import Following, Positioning, Target
 from katana450.extensions.recording.forms import FormError, shown
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.water.motion import MotionWithWater
+from katana450.maths.water.flow import MotionWithWater
 from katana450.maths.water.units import ML
 
 FORMER: Mapping[str, Any] = {"liquid": ["water", 998.2, 1.0016e-3, 72.74e-3, [74, 148, 192]]}
@@ -39,9 +39,21 @@ COMMANDS: Mapping[str, str] = {
 """Present names of the commands whose former class had another name."""
 
 
-def command_form(form: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return ``form`` of a command as it is written now."""
+def command_form(form: Mapping[str, Any], detours: list[Any]) -> Mapping[str, Any]:
+    """Return ``form`` of a command as it is written now.
+
+    Older versions offered a detour after a drag, which a command of its own took. ``detours`` has
+    the forms of the plans that were offered so far, the newest last.
+    """
     former = form.get("is")
+    match form:
+        case {"is": "OfferDetour" | "offer_detour", "plan": plan}:
+            detours.append(plan)
+            return {"is": "batch", "commands": []}
+        case {"is": "Go" | "go"} if detours:
+            return {"is": "follow", "plan": detours[-1], "tau": 0.0}
+        case {"is": "branch", "shoulder": shoulder, "elbow": elbow, "name": name}:
+            return {"is": "branch", "name": name or f"{shoulder}-{elbow}"}
     if not isinstance(former, str) or not former[:1].isupper():
         return form
     now = dict(form) | {"is": COMMANDS.get(former, tag_of(former))}
@@ -54,8 +66,9 @@ def command_form(form: Mapping[str, Any]) -> Mapping[str, Any]:
             ]
         case "MoveTool", {"position": _}:
             now["p"] = now.pop("position")
-        case "TakeBranch", {"branch": dict()}:
-            now |= now.pop("branch")
+        case "TakeBranch", {"branch": {"shoulder": shoulder, "elbow": elbow}}:
+            now["name"] = f"{shoulder}-{elbow}"
+            del now["branch"]
         case "TakeBranch", {"branch": _}:
             now["name"] = now.pop("branch")
         case "Fill", {"volume": int(volume) | float(volume)}:
@@ -83,10 +96,18 @@ def _millilitres(volume: float) -> float:
     return next((number for number in near if ML * number == volume), ml)
 
 
-def upgraded(kind: type, form: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return ``form`` of a value of ``kind`` as it is written now. Raises FormError."""
+def upgraded(kind: type, form: Mapping[str, Any], detours: list[Any]) -> Mapping[str, Any]:
+    """Return ``form`` of a value of ``kind`` as it is written now. Raises FormError.
+
+    detours: see `command_form`.
+    """
     if kind is ToolTarget and "R" in form:
         return {"position": form.get("position"), "rotation": form["R"]}
+    if kind is Following:
+        return {name: content for name, content in form.items() if name != "towards"}
+    if kind is Positioning:
+        detours += filter(None, [form.get("detour")])
+        return {name: content for name, content in form.items() if name != "detour"}
     if kind is not MotionWithWater or "motions" in form:
         return form
     whole, water = dict(form), form.get("water")

@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
-from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.objects.gripper_model import GripperModel
+from katana450.arm.control.arm import ArmModel, GripperModel
 from katana450.arm.control.state.state import Status
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.atomic import write_files, writer_of

@@ -40,7 +40,7 @@ from katana450.extensions.recording.files.simulation import (
 )
 from katana450.extensions.recording.files.table import columns
 from katana450.maths.collision.clearance import MIN_CLEARANCE
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 

@@ -21,13 +21,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands.commands import Batch, Command, Stop
+from katana450.arm.control.lease import Actor
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.stopping import with_name
 from katana450.arm.control.state.arm_report import ArmReport
-from katana450.arm.control.state.following import Following
-from katana450.arm.control.state.modes import Leaving, Mode, Positioning, Tracking
+from katana450.arm.control.state.modes import Following, Leaving, Mode, Positioning, Tracking
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
 from katana450.arm.control.state.stop_cause import StopCause
@@ -99,12 +98,13 @@ def _mode(mode: Mode) -> tuple[Any, ...]:
     name = type(mode).__name__
     match mode:
         case Following(plan=plan):
-            return name, plan.span, mode.number, mode.pace, mode.towards
+            # Older versions could go back on a plan, to any place of it.
+            return name, plan.span, mode.number, mode.pace, plan.span
         case Leaving(along=along, then=then):
             return name, _mode(along), _mode(then)
-        case Positioning(target=target, beyond_gap=beyond, detour=detour):
-            span = None if detour is None else detour.span
-            return name, *target_content(target), beyond, span
+        case Positioning(target=target, beyond_gap=beyond):
+            # Older versions had a detour there.
+            return name, *target_content(target), beyond, None
         case Tracking():
             target, since = target_content(mode.target)[1], target_content(mode.since)[1]
             return name, {"target": target, "since": since, "let_go": mode.let_go}

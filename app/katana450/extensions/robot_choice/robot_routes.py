@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.lease import CommandChannel
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.gallery.arms_command import listed_robots
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError

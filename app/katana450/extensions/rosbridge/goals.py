@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands.act import MAX_WAIT
+from katana450.arm.control.lease import Actor
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.programs.steps.trajectory import MIN_INTERVAL
 from katana450.extensions.rosbridge.protocol import (

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from argparse import Namespace
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -101,3 +102,9 @@ def _too_large(path: Path) -> RobotDescriptionError:
         f"{path} cannot be expanded: xacro needs more than {SECONDS:g} s of processor time or "
         f"{MAX_MEMORY_BYTES >> 20} MiB for it. Look for a macro, list or number without end in it."
     )
+
+
+def expand_with_arguments(options: Namespace) -> None:
+    """Expand the file now if there are arguments for it, and name the result in its place."""
+    if getattr(options, "xacro_arg", None):
+        options.urdf = expanded_file(options.urdf, dict(options.xacro_arg))

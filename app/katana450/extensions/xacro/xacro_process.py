@@ -8,11 +8,13 @@ if it is FILE, and the line if it is unknown.
 
 from __future__ import annotations
 
+import ast
 import errno
 import json
 import os
+import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import redirect_stderr, suppress
 from pathlib import Path
 from typing import Any
@@ -21,10 +23,144 @@ from xml.parsers.expat import ErrorString, ExpatError
 import xacro
 from xacro import substitution_args
 
-from katana450.extensions.xacro import ros_package as ros
-from katana450.extensions.xacro.xacro_expression import evaluated
 from katana450.extensions.xacro.xacro_file import MAX_BYTES, MAX_MEMORY_BYTES, READABLE, SECONDS
 from katana450.platform_support import limit_resources
+
+NAME = re.compile(r"[A-Za-z][\w-]*")
+
+MANIFEST = "package.xml"
+
+MANIFEST_NAME = re.compile(rb"<name>\s*([\w-]+)\s*</name>")
+"""The name of a package in its package.xml."""
+
+WORKSPACES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH", "CMAKE_PREFIX_PATH")
+"""Environment variables that list folders of packages."""
+
+HOME = Path(os.path.expanduser("~")).resolve()
+"""The home folder of this user; `Path.home` fails where there is none."""
+
+
+def package_folder(name: str, folder: Path) -> Path | None:
+    """Return the folder of the package ``name``; None if it is not found.
+
+    It is ``folder`` or one above it, if its package.xml has that name; a folder ``name`` beside one
+    of these; or where ROS_PACKAGE_PATH and AMENT_PREFIX_PATH lead. A folder beside the home folder
+    or one above it, in the home folder, or behind a link needs a package.xml.
+    """
+    if not NAME.fullmatch(name):
+        return None
+    for above in (folder, *folder.parents):
+        if _manifest_name(above) == name:
+            return above
+        if _is_package(above / name):
+            return above / name
+    return next((place for place in _installed(name) if place.is_dir()), None)
+
+
+def package_of(file: Path) -> Path:
+    """Return the innermost folder around ``file`` with a package.xml, or else its own folder."""
+    return next((above for above in file.parents if _has_manifest(above)), file.parent)
+
+
+def workspaces() -> list[Path]:
+    """Return the folders with packages that the environment names."""
+    return [path for variable in WORKSPACES for path in _paths(variable)]
+
+
+def real_folders(folder: Path) -> set[Path]:
+    """Return the folder behind the link ``folder``, and the one behind its package.xml.
+
+    colcon can install each file of a package as a link to its source.
+    """
+    source = (folder / MANIFEST).resolve()
+    linked = source.name == MANIFEST and source.is_file()
+    return {folder.resolve(), *([source.parent] if linked else [])}
+
+
+def _has_manifest(folder: Path) -> bool:
+    # Path.is_file raises an error where a folder is private.
+    return os.path.isfile(folder / MANIFEST)
+
+
+def _is_package(folder: Path) -> bool:
+    above = folder.parent.resolve()
+    plain = folder.resolve().parent == above and above not in (HOME, *HOME.parents)
+    return folder.is_dir() and (plain or _has_manifest(folder))
+
+
+def _manifest_name(folder: Path) -> str | None:
+    with suppress(OSError):
+        match = MANIFEST_NAME.search((folder / MANIFEST).read_bytes())
+        return match and match[1].decode()
+    return None
+
+
+def _installed(name: str) -> Iterator[Path]:
+    for part in _paths("ROS_PACKAGE_PATH"):
+        yield part if part.name == name or _manifest_name(part) == name else part / name
+    for part in _paths("AMENT_PREFIX_PATH"):
+        yield part / "share" / name
+
+
+def _paths(variable: str) -> list[Path]:
+    return [Path(part) for part in os.environ.get(variable, "").split(os.pathsep) if part]
+
+
+PLAIN = (str, int, float, complex, list, tuple, dict, set, frozenset)
+"""Types of values whose public methods an expression can call."""
+
+REFUSED = frozenset({"format", "format_map"})
+"""Methods whose text argument can read attributes."""
+
+ATTRIBUTE = "attribute of"
+"""Name of the function that reads an attribute; no expression can contain it."""
+
+
+class UnsafeExpressionError(Exception):
+    """An expression that is not evaluated, with the reason."""
+
+
+def evaluated(text: str, symbols: dict[str, Any], names: Mapping[str, Any] | None = None) -> object:
+    """Return the value of the expression ``text``.
+
+    Args:
+        text: a Python expression.
+        symbols: what its names mean; gets two more entries.
+        names: what its names mean first.
+
+    Raises:
+        UnsafeExpressionError: it uses a private name, or an attribute of anything but plain values.
+        Exception: whatever the expression raises.
+    """
+    tree = _Guarded().visit(ast.parse(text.strip(), "<expression>", "eval"))
+    code = compile(ast.fix_missing_locations(tree), "<expression>", "eval")
+    symbols.update({"__builtins__": {}, ATTRIBUTE: _attribute})
+    return eval(code, symbols, names)
+
+
+class _Guarded(ast.NodeTransformer):
+    """Replaces each attribute by a call of ``_attribute``, and refuses private names."""
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if node.id.startswith("__"):
+            raise UnsafeExpressionError(f"the name {node.id!r} is not allowed")
+        return node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        function = ast.Name(ATTRIBUTE, ast.Load())
+        return ast.Call(function, [self.visit(node.value), ast.Constant(node.attr)], [])
+
+
+def _attribute(value: object, name: str) -> object:
+    """Return the entry ``name`` of a mapping, or a public attribute of a plain value."""
+    # Namespaces of xacro and mappings of YAML are mappings that are read with a dot.
+    if isinstance(value, dict) and name in value and not name.startswith("_"):
+        return value[name]
+    kind = next((kind for kind in PLAIN if isinstance(value, kind)), None)
+    if kind is None or name.startswith("_") or name in REFUSED or not hasattr(kind, name):
+        raise UnsafeExpressionError(f"the attribute {name!r} is not allowed, or does not exist")
+    return getattr(value, name)
+
 
 HIDDEN = ("type", "vars")
 """Functions of the namespace ``python`` that lead from a value to other code."""
@@ -57,9 +193,9 @@ class FileGuard:
         self.folders: set[Path] = set()
         # Python loads some of its modules when they are first used.
         python = map(Path, (sys.prefix, sys.base_prefix, *sys.path))
-        own = (ros.package_of(path), ros.package_of(path.resolve()))
-        for folder in (*own, *ros.workspaces(), *python):
-            self.folders |= ros.real_folders(folder)
+        own = (package_of(path), package_of(path.resolve()))
+        for folder in (*own, *workspaces(), *python):
+            self.folders |= real_folders(folder)
 
     def __call__(self, event: str, arguments: tuple[Any, ...]) -> None:
         """Refuse the event by an exception, or do nothing."""
@@ -148,9 +284,9 @@ class Expansion:
         raise _FaultError(f"there is no environment variable {name!r} of ROS")
 
     def _eval_find(self, package: str) -> str:
-        folder = ros.package_folder(package, self._path.parent)
+        folder = package_folder(package, self._path.parent)
         if folder is not None:
-            self._folders |= ros.real_folders(folder)
+            self._folders |= real_folders(folder)
             return str(folder)
         self._at_fault = f"find {package}"
         raise _FaultError(

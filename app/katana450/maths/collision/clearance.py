@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import PATH_LENGTH_FACTOR, CollisionWorld, PlacedWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.geometry.curve import JointCurve

@@ -15,13 +15,44 @@ from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from importlib.resources import files
 from math import hypot
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from katana450.caching import cached_property
-from katana450.maths.collision.contact import Witness
 from katana450.maths.geometry.arrays import FloatArray, frozen
+
+
+class Witness(NamedTuple):
+    """The nearest points of two bodies.
+
+    Attributes:
+        distance: distance between them [m]; a negative value is their depth.
+        points: the nearest point of each, (2, 3) [m].
+        normal: unit direction (3,) from the first body to the second.
+    """
+
+    distance: float
+    points: FloatArray
+    normal: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """The nearest points of two parts.
+
+    Attributes:
+        parts: the names of the parts.
+        distance: distance between them [m]; a negative value is their depth.
+        points: the nearest point of each, (2, 3) in the base frame [m].
+        normal: unit direction (3,) from the first part to the second, in the base frame.
+    """
+
+    parts: tuple[str, str]
+    distance: float
+    points: FloatArray
+    normal: FloatArray
+
 
 GEOMETRIES, VERTICES = 512, 32768
 """Number of geometries that a thread keeps, and of all their vertices. Then it starts again."""

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from katana450.caching import cached_property
 from katana450.maths.collision import engine
-from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.engine import Placement
+from katana450.maths.collision.engine import Contact, Placement
 from katana450.maths.collision.linkage import GROUND, Linkage
 from katana450.maths.collision.shape import PLANE, CollisionShape
 from katana450.maths.geometry.arrays import FloatArray, frozen

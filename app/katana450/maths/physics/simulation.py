@@ -18,14 +18,18 @@ from katana450.maths.collision.linkage import Linkage
 from katana450.maths.collision.world import Part
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.physics.body import REST_TIME, BodyMotion, BoolArray, FingerContact, RigidBody
 from katana450.maths.physics.model import (
     BODY,
     LINK,
     LINK_MASS,
+    REST_TIME,
     SLIP_STEPS,
     STEP,
+    BodyMotion,
+    BoolArray,
+    FingerContact,
     FingerDrive,
+    RigidBody,
     compile_model,
 )
 

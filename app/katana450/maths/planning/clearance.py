@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.maths.collision.clearance import MIN_CLEARANCE, rounding_of
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld, PlacedWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.checkpoint import checkpoint

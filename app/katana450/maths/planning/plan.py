@@ -13,7 +13,7 @@ import numpy as np
 from katana450.caching import cached_property
 from katana450.errors import BlockedError, InputError
 from katana450.maths.collision.clearance import MIN_CLEARANCE
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import CollisionWorld, Fingerprint
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward

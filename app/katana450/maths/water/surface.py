@@ -14,7 +14,7 @@ import numpy.typing as npt
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.flow import WaterSurface
-from katana450.maths.water.parcel import THICKNESS, Parcel
+from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY
 
 Faces = npt.NDArray[np.uint32]
@@ -29,18 +29,10 @@ SECTIONS, SIDES = 20, 8
 """Number of sections and sides of the stream."""
 
 MAX_STREAM_RADIUS = 0.3
-"""Maximum radius of the stream at the lip, in cup radii: there it is slow, and a sheet rather than
-a jet.
-"""
-
-SHEET, GATHERED = 0.9, 0.03
-"""Excess width of the sheet at the lip over a jet [1], and the length [m] in which it contracts."""
+"""Maximum radius of the stream at the lip, in cup radii: there it is slow."""
 
 SPOKES = 40
 """Number of spokes of a disc."""
-
-DOME = ((0.55, 1.0), (0.82, 0.94), (0.95, 0.62), (1.0, 0.0))
-"""(radius, height) from the middle of a puddle to its edge, relative to radius and thickness."""
 
 ROUND = 1e-9
 """Cosine of a tilt below which the surface is drawn along the axis."""
@@ -131,14 +123,7 @@ def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
     under = v[:, (2, 2, 1)] * (across[1], -across[0], across[0])
     under[:, 2] -= across[1] * v[:, 0]
     under /= speed[:, None]
-    away = p - p[0]
-    near = np.exp(-np.sqrt((away * away).sum(axis=1)) / GATHERED)
-    spread = 1.0 + SHEET * near
-    wide, thin = jet * spread, jet / spread
-    aside = wide[:, None] * _ROUND_COS
-    # At the lip the sheet lies on the rim and follows its curve.
-    lift = near[:, None] * (aside**2 / (2.0 * radius) + thin[:, None])
-    down = thin[:, None] * _ROUND_SIN - lift
+    aside, down = jet[:, None] * _ROUND_COS, jet[:, None] * _ROUND_SIN
     corners = p[:, None] + aside[..., None] * across + down[..., None] * under[:, None]
     return np.asarray(corners.reshape(-1, 3))
 
@@ -179,28 +164,6 @@ def disc() -> tuple[FloatArray, Faces]:
     k = np.arange(SPOKES)
     fan = (np.zeros_like(k), 1 + k, 1 + (k + 1) % SPOKES)
     return np.concatenate(([[0.0, 0.0, 1.0]], rim)), _stacked([fan])
-
-
-def blob() -> tuple[FloatArray, Faces]:
-    """Return corners and faces of a puddle on z = 0: irregular, with the area of a unit disc."""
-    turn = np.arange(SPOKES) * (math.tau / SPOKES)
-    edge = 1.0 + 0.07 * np.cos(2 * turn + 1.0) + 0.05 * np.cos(3 * turn + 2.1)
-    edge += 0.03 * np.cos(5 * turn)
-    edge /= math.sqrt(float(np.mean(edge**2)))
-    rings = [
-        np.stack(
-            (out * edge * np.cos(turn), out * edge * np.sin(turn), np.full(SPOKES, up * THICKNESS)),
-            axis=1,
-        )
-        for out, up in DOME
-    ]
-    k = np.arange(SPOKES)
-    after = (k + 1) % SPOKES
-    faces = [(np.zeros_like(k), 1 + k, 1 + after)]
-    for row in range(len(DOME) - 1):
-        inner, outer = 1 + row * SPOKES, 1 + (row + 1) * SPOKES
-        faces += [(inner + k, outer + k, outer + after), (inner + k, outer + after, inner + after)]
-    return np.concatenate((np.array([[0.0, 0.0, THICKNESS]]), *rings)), _stacked(faces)
 
 
 def _stacked(threes: Sequence[Sequence[npt.NDArray[np.intp]]]) -> Faces:

@@ -264,7 +264,6 @@ class State(Answer, frozen=True, kw_only=True):
         moving: Whether the arm moves, or plans a path that it will follow.
         why: Reason for the status in words; empty without one.
         findings: Reasons for which the goal is not the target, or is not approached.
-        detour: Duration [s] of the detour that ``go`` moves along; null without an offer.
         speed: Fraction of full speed.
         holder: Name of the holder of the lease; null while the lease is free.
         stopped: Reason for which the arm is stopped; null otherwise.
@@ -310,7 +309,6 @@ class State(Answer, frozen=True, kw_only=True):
     moving: bool
     why: str
     findings: list[Finding]
-    detour: float | None
     speed: float
     holder: str | None
     stopped: str | None

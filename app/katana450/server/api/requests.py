@@ -15,7 +15,6 @@ from msgspec import Meta
 
 from katana450.arm.control.commands.act import *
 from katana450.arm.control.commands.act import Id, MotionRequest, Name, Request, Traits, tag_of
-from katana450.arm.control.commands.arm_commands import *
 from katana450.arm.control.commands.checked import Transform, decoded_field
 from katana450.arm.control.commands.joint_commands import *
 from katana450.arm.control.commands.motion_commands import *

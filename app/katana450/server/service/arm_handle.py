@@ -6,23 +6,20 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Future
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.lease import Actor
 from katana450.arm.control.objects.environment import Environment
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.session.silence import SilenceProfile
-from katana450.arm.control.session.stopping import clear_refusal
+from katana450.arm.control.session.stopping import SilenceProfile, clear_refusal
 from katana450.arm.control.session.tool_targets import BranchOption
-from katana450.arm.control.state.margins import Margins, margins
+from katana450.arm.control.state.findings import Margins, margins
 from katana450.arm.control.state.state import Outcome, State
-from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.weight import loads_of
+from katana450.arm.robot.arm_reader import MountedArm
+from katana450.arm.robot.robot import Robot, loads_of
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.pipes.front_end import FrontEnd
-from katana450.arm.runtime.pipes.state_publisher import Snapshot
+from katana450.arm.runtime.pipes.state_publisher import LoopTiming, Snapshot
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.errors import InputError
 from katana450.maths.collision.world import CollisionWorld

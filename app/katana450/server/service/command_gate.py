@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple, Self
 
-from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Lease, Person
+from katana450.arm.control.lease import SERVER, Actor, CommandChannel, Grounds, Lease, Person
 from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import CAUSES, Finding, State
 from katana450.arm.control.state.stop_cause import StopCause, pressed
-from katana450.arm.runtime.pipes.presses import Presses
+from katana450.arm.runtime.mailbox import Presses
 from katana450.arm.runtime.pipes.state_publisher import Snapshot
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from katana450.arm.control.lease import Person
-from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.session.stopping import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.server.service.command_gate import CommandGate
 

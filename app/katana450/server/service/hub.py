@@ -12,11 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Lease, Person
-from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
-from katana450.arm.control.state.event_log import entries_between
+from katana450.arm.control.lease import Actor, CommandChannel, Lease, Person
+from katana450.arm.control.session.stopping import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.state.findings import entries_between
 from katana450.arm.control.state.messages import finding_text, sentence
 from katana450.arm.control.state.state import State
 from katana450.arm.control.state.stop_cause import StopCause, pressed

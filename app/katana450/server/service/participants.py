@@ -8,8 +8,7 @@ from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from katana450.arm.control.actor import Actor, CommandChannel, Grounds
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import Actor, CommandChannel, Grounds, Person, Role
 from katana450.arm.control.state.stop_cause import StopCause
 from katana450.errors import InputError
 from katana450.server.service.heartbeats import LastHeartbeat

@@ -9,9 +9,8 @@ from __future__ import annotations
 from queue import SimpleQueue
 from typing import Any, NamedTuple
 
-from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.commands.act import Command
-from katana450.arm.control.lease import Lease, Person, Role
+from katana450.arm.control.lease import Actor, CommandChannel, Lease, Person, Role
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.errors import KatanaError
 

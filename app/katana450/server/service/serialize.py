@@ -12,17 +12,16 @@ from katana450.arm.control.commands.act import tag_of
 from katana450.arm.control.objects.environment import Hand
 from katana450.arm.control.objects.grip import FINGER_FORCE, finger_forces, touching
 from katana450.arm.control.objects.pouring import Pouring
-from katana450.arm.control.session.outcome import reason
+from katana450.arm.control.session.checks import reason
 from katana450.arm.control.session.tool_targets import BranchOption
 from katana450.arm.control.state import state as control
 from katana450.arm.control.state.arm_report import ArmReport
-from katana450.arm.control.state.margins import Margins
+from katana450.arm.control.state.findings import Margins
 from katana450.arm.control.state.messages import finding_text, sentence
 from katana450.arm.control.state.solid import Colour
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.loop_timing import LoopTiming
-from katana450.arm.runtime.pipes.state_publisher import Snapshot
+from katana450.arm.runtime.pipes.state_publisher import LoopTiming, Snapshot
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
@@ -138,7 +137,6 @@ def _of_snapshot(arm: ArmHandle, snapshot: Snapshot) -> dict[str, Any]:
         "status": now.status.value,
         "why": sentence(now),
         "findings": [finding(cause) for cause in now.findings],
-        "detour": None if now.detour is None else now.detour.duration / now.speed,
         "speed": now.speed,
         "silence_profile": arm.profile.value,
         "water": water(arm.session.pouring, now),
@@ -265,16 +263,15 @@ def _joint_links(robot: Robot, names: Sequence[str]) -> list[answers.JointLink]:
 
 def branch_option(choice: BranchOption) -> answers.BranchOption:
     """Return a branch that can be chosen as a part of an answer."""
-    metrics, branch = choice.metrics, choice.metrics.branch
+    branch = choice.branch
     return msgspec.convert(
         {
-            **vars(metrics),
+            **vars(choice),
             "name": str(branch),
             "shoulder": None if isinstance(branch, str) else branch.shoulder,
             "elbow": None if isinstance(branch, str) else branch.elbow,
-            "q": metrics.q.tolist(),
+            "q": choice.q.tolist(),
             "contact": None if choice.contact is None else choice.contact.parts,
-            "refusal": choice.refusal,
         },
         answers.BranchOption,
     )

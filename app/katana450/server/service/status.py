@@ -116,7 +116,7 @@ def pace_refusal(hub: Hub, participant: Participant) -> str:
 def common(hub: Hub) -> dict[str, Any]:
     """Return the part of the status that is the same for all pages."""
     state = hub.arm.state if hub.arm is not None else None
-    stopped, holder, age = hub.stopped, hub.lease.driver, silence(hub)
+    stopped, holder = hub.stopped, hub.lease.driver
     return {
         **state_line(hub)._asdict(),
         "stop": None if stopped is None else stopped.stage,
@@ -126,7 +126,6 @@ def common(hub: Hub) -> dict[str, Any]:
         "problem": hub.stop_path.problem or hub.recorder.problem,
         "holder": None if holder is None else holder.name,
         "silence_profile": "" if hub.arm is None else hub.arm.profile.value,
-        "detour": state is not None and state.detour is not None and age is None,
         "speed": 1.0 if state is None else state.speed,
         "paused": state is not None and state.paused,
         "arm": None if state is None or state.report is None else arm_status(state, state.report),

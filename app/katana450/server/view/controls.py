@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 import viser
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.lease import Actor
 from katana450.errors import KatanaError, LeaseError
 
 WORTH_SENDING = 2e-6

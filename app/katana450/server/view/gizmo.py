@@ -18,7 +18,6 @@ from functools import partial
 import numpy as np
 import viser
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands.commands import (
     Command,
     EndDrag,
@@ -27,8 +26,9 @@ from katana450.arm.control.commands.commands import (
     Turn,
     TurnElbow,
 )
+from katana450.arm.control.lease import Actor
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.errors import KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -255,7 +255,7 @@ class Gizmo:
         place: tuple[float, ...],
     ) -> None:
         """Submit ``command`` of a drag to ``place``, and the end of the drag."""
-        # A hand that lets go without a motion gives no new target: the arm may be on a detour.
+        # A hand that lets go without a motion gives no new target: the arm may have another one.
         again = event.phase == "end" and place == self._sent
         self._sent = () if event.phase == "end" else place
         # A drag sends 20 messages a second: the next one repeats the request or shows the refusal.

@@ -14,7 +14,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.tool_targets import BranchOption
 from katana450.arm.control.state.messages import degrees, millimetres, part, short, signed
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import AnyBranch
@@ -364,9 +364,9 @@ def _rows(options: tuple[BranchOption, ...], now: AnyBranch) -> str:
     """Return the table as HTML, with one row per branch and the branch ``now`` marked."""
     head = "".join(f"<th>{escape(heading)}</th>" for heading in HEADINGS)
     rows = "".join(
-        f"<tr data-branch='{choice.metrics.branch}'"
-        f"{' aria-current=true' if choice.metrics.branch == now else ''}>"
-        f"<th><i style='background:rgb{colour}'></i>{choice.metrics.branch}</th>"
+        f"<tr data-branch='{choice.branch}'"
+        f"{' aria-current=true' if choice.branch == now else ''}>"
+        f"<th><i style='background:rgb{colour}'></i>{choice.branch}</th>"
         + "".join(f"<td>{escape(cell)}</td>" for cell in cells_of(choice))
         + "</tr>"
         for choice, colour in zip(options, COLOURS, strict=False)
@@ -379,15 +379,14 @@ def _rows(options: tuple[BranchOption, ...], now: AnyBranch) -> str:
 
 def cells_of(choice: BranchOption) -> tuple[str, str, str]:
     """Return the loss, the path length and time, and the smallest singular value of a branch."""
-    metrics = choice.metrics
     if choice.refusal:
         return choice.refusal.partition(" exclude")[0].removeprefix("The "), "–", "–"
     lost = []
-    if metrics.position_error > POSITION_WORTH_TELLING:
-        lost.append(f"{short(1e3 * metrics.position_error)} mm")
-    if metrics.rotation_error > ANGLE_WORTH_TELLING:
-        lost.append(f"{short(math.degrees(metrics.rotation_error))}°")
+    if choice.position_error > POSITION_WORTH_TELLING:
+        lost.append(f"{short(1e3 * choice.position_error)} mm")
+    if choice.rotation_error > ANGLE_WORTH_TELLING:
+        lost.append(f"{short(math.degrees(choice.rotation_error))}°")
     if choice.contact is not None:
         lost.append(" meets ".join(map(part, choice.contact.parts)))
-    path = f"{degrees(metrics.distance, 0)}, {metrics.time:.1f} s"
-    return ", ".join(lost) or NOTHING_LOST, path, f"{metrics.smallest_singular_value:.3f}"
+    path = f"{degrees(choice.distance, 0)}, {choice.time:.1f} s"
+    return ", ".join(lost) or NOTHING_LOST, path, f"{choice.smallest_singular_value:.3f}"

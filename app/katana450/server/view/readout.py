@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.joints import JointSet
+from katana450.arm.control.arm import JointSet
 from katana450.arm.control.state.messages import axis_names, limit_text, signed
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

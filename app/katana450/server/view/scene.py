@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from katana450.arm.robot.creases import smooth_normals
 from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import VisualMesh
+from katana450.arm.robot.surfaces import VisualMesh, smooth_normals
 from katana450.arm.robot.visual import Visual
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray

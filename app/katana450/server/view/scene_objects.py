@@ -11,9 +11,9 @@ from katana450.arm.control.objects.environment import Environment
 from katana450.arm.control.state.scene_objects import SceneObject, Shape, Zone
 from katana450.arm.control.state.solid import Colour, Solid
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.creases import Drawn, drawn, glb
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props
+from katana450.arm.robot.surfaces import Drawn, drawn, glb
 from katana450.arm.robot.visual import Visual
 from katana450.maths.collision.engine import hull_triangles
 from katana450.maths.geometry import so3

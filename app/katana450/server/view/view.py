@@ -14,7 +14,7 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.messages import title
 from katana450.arm.control.state.modes import JointTarget, PoseTarget
 from katana450.arm.control.state.state import State, Status
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot

@@ -14,8 +14,8 @@ from typing import Any
 import viser
 from viser import _messages as wire
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.lease import Actor
 from katana450.errors import LeaseError
 from katana450.server.service.heartbeats import check_in_time
 from katana450.server.service.hub import Hub

@@ -16,7 +16,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.lease import CommandChannel
 from katana450.errors import InputError
 from katana450.server.service.heartbeats import LeastDelay
 from katana450.server.service.hub import Hub

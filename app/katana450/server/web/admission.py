@@ -12,8 +12,7 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from katana450.arm.control.actor import CommandChannel
-from katana450.arm.control.lease import Role
+from katana450.arm.control.lease import CommandChannel, Role
 from katana450.errors import InputError
 from katana450.server.api.fields import STOP_PATHS
 from katana450.server.service.identity import Identity

@@ -17,9 +17,8 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.commands.act import Id
-from katana450.arm.control.lease import LEASE_TIMEOUT
+from katana450.arm.control.lease import LEASE_TIMEOUT, CommandChannel
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import msgspec
 from starlette.websockets import WebSocket
 
-from katana450.arm.control.actor import CommandChannel
-from katana450.arm.control.lease import HEARTBEAT_INTERVAL
+from katana450.arm.control.lease import HEARTBEAT_INTERVAL, CommandChannel
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize

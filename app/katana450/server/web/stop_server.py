@@ -22,8 +22,7 @@ from urllib.parse import parse_qs, urlsplit
 import h11
 import msgspec
 
-from katana450.arm.control.actor import Actor, CommandChannel, Grounds
-from katana450.arm.control.lease import Person
+from katana450.arm.control.lease import Actor, CommandChannel, Grounds, Person
 from katana450.arm.control.state.stop_cause import UNNAMED, StopCause, pressed
 from katana450.arm.runtime.pipes.stop_messages import NO_STATE, StopPress, StopStatus
 from katana450.errors import InputError

@@ -49,7 +49,6 @@ class Traits:
         protective: may also be given by the server itself, which never moves the arm.
         joints_only: possible for a mechanism that has joints and no tool.
         planned: a path is planned first, so the command takes effect later than its ticket.
-        keeps_detour: leaves an offered detour; all others change what its plan depends on.
         goal: name of its change of the arm's goal, by which undo names it; empty if it changes
             none.
         gesture: continues the change by the command before it if it follows soon, as the samples of
@@ -74,7 +73,6 @@ class Traits:
     protective: bool = False
     joints_only: bool = False
     planned: bool = False
-    keeps_detour: bool = False
     goal: str = ""
     gesture: bool = False
     safety: bool = False

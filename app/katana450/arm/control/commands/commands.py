@@ -1,7 +1,6 @@
 """All commands of the arm, from the modules of their subjects."""
 
 from katana450.arm.control.commands.act import *
-from katana450.arm.control.commands.arm_commands import *
 from katana450.arm.control.commands.joint_commands import *
 from katana450.arm.control.commands.motion_commands import *
 from katana450.arm.control.commands.object_commands import *

@@ -1,4 +1,4 @@
-"""Commands about a whole motion: its begin, its pace, its pause, its plan."""
+"""Commands about a whole motion, and about a real arm itself."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from msgspec import Meta
 
 from katana450.arm.control.commands.act import Command, MotionRequest, Name, Request, Traits
 from katana450.arm.control.commands.checked import check_finite
+from katana450.arm.control.state.arm_report import ArmAct
 from katana450.arm.control.state.state import Finding
 from katana450.errors import InputError
-from katana450.maths.kinematics.branch import Elbow, Shoulder
 from katana450.maths.planning.plan import Plan
 
 MIN_SPEED = 0.01
@@ -33,26 +33,12 @@ class Branch(Command, MotionRequest, frozen=True):
     """Move to the target pose on another branch: with another shoulder or elbow.
 
     Attributes:
-        shoulder: Shoulder of the branch of a five-axis arm.
-        elbow: Elbow of the branch of a five-axis arm.
-        name: Name of the branch, in place of shoulder and elbow; the answer ``branches`` has it.
+        name: Name of the branch; the answer ``branches`` has it.
     """
 
     traits: ClassVar[Traits] = Traits(planned=True, goal="branch")
 
-    shoulder: Shoulder | None = None
-    elbow: Elbow | None = None
-    name: Name | None = None
-
-    def __post_init__(self) -> None:
-        five = (self.shoulder is None) + (self.elbow is None)
-        if five != (0 if self.name is None else 2):
-            raise InputError("A branch has a shoulder and an elbow, or a name.")
-
-    @property
-    def full_name(self) -> str:
-        """Name of the branch, also if it is given by shoulder and elbow."""
-        return self.name or f"{self.shoulder}-{self.elbow}"
+    name: Name
 
 
 class Hold(Command, MotionRequest, frozen=True):
@@ -114,7 +100,6 @@ class Speed(Command, Request, frozen=True):
         supersedes=False,
         passive=True,
         joints_only=True,
-        keeps_detour=True,
         gesture=True,
     )
 
@@ -141,27 +126,6 @@ class Follow(Command, frozen=True, eq=False):
             raise InputError(f"`tau` must be from 0 to below {self.plan.span:g}, not {self.tau!r}.")
 
 
-class GoAlong(Command, frozen=True):
-    """Continue or go back on the plan to ``fraction`` of it: 0 is its start, 1 its end."""
-
-    traits: ClassVar[Traits] = Traits()
-
-    fraction: float
-
-    def __post_init__(self) -> None:
-        check_finite("The fraction of the plan", self.fraction)
-        if not 0.0 <= self.fraction <= 1.0:
-            raise InputError(f"The fraction of the plan must be from 0 to 1, not {self.fraction}.")
-
-
-class OfferDetour(Command, frozen=True, eq=False):
-    """Offer ``plan``, from the goal of a drag to the pose beyond its gap; nothing moves."""
-
-    traits: ClassVar[Traits] = Traits(supersedes=False, passive=True)
-
-    plan: Plan
-
-
 class Batch(Command, frozen=True, eq=False):
     """Execute several commands in one tick: all of them, or none if one is invalid."""
 
@@ -177,3 +141,26 @@ class Batch(Command, frozen=True, eq=False):
     def parts(self) -> tuple[Command, ...]:
         """The commands of the batch."""
         return self.commands
+
+
+class OperateArm(Command, Request, frozen=True):
+    """Connect, calibrate or switch the motors of a real arm. It must be stopped and at rest.
+
+    The state lists the acts that are possible; its ``arm.mode`` tells what becomes of an act.
+
+    Attributes:
+        act: connect; disconnect; calibrate: the arm moves to its mechanical stops; engage: the
+            motors hold the arm, which was calibrated before; release: motors off, the arm falls;
+            unblock: hold again after a collision or an error.
+        confirmed: Whether a person has confirmed the hazard. Without it, an act that has one is
+            refused with the text of the hazard.
+    """
+
+    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True)
+
+    act: ArmAct
+    confirmed: bool = False
+
+    def __post_init__(self) -> None:
+        if self.act.hazard and not self.confirmed:
+            raise InputError(f"{self.act.hazard} Confirm this, and give the command again.")

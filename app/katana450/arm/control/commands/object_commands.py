@@ -110,7 +110,7 @@ class SetAppearance(Command, frozen=True):
     See ``LinkAppearance.having``.
     """
 
-    traits: ClassVar[Traits] = replace(SCENE_TRAITS, keeps_detour=True)
+    traits: ClassVar[Traits] = SCENE_TRAITS
 
     name: str
     trait: AppearanceTrait

@@ -239,20 +239,7 @@ class TurnElbow(Command, MotionRequest, frozen=True):
 class EndDrag(Command, MotionRequest, frozen=True):
     """End a drag: the nearest pose that the arm can reach becomes the target."""
 
-    traits: ClassVar[Traits] = Traits(
-        joints_only=True, keeps_detour=True, goal="drag", gesture=True
-    )
-
-
-class Go(Command, MotionRequest, frozen=True):
-    """Move along the detour that the state offers, to the target that a drag did not reach.
-
-    A drag ends at a gap where a joint would have to leap. If a clear path on the same branch leads
-    to its target, the field ``detour`` of the state has its duration. Refused without an offer; any
-    change withdraws it.
-    """
-
-    traits: ClassVar[Traits] = Traits(goal="detour")
+    traits: ClassVar[Traits] = Traits(joints_only=True, goal="drag", gesture=True)
 
 
 class Tool(Command, Request, frozen=True):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from katana450.arm.control.objects.gripper_model import GripperModel
+from katana450.arm.control.arm import GripperModel
 from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Zone
 from katana450.caching import cached_property
 from katana450.maths.collision.clearance import MIN_CLEARANCE

@@ -9,7 +9,7 @@ from katana450.arm.control.objects.environment import Environment, Hand
 from katana450.arm.control.session.goals import without_finding
 from katana450.arm.control.state.scene_objects import SceneObject, named, placed
 from katana450.arm.control.state.state import Finding, Reason, State
-from katana450.maths.physics.body import FingerContact
+from katana450.maths.physics.model import FingerContact
 
 FINGER_FORCE = 10.0
 """[N] Greatest force of the fingers of one side. Assumed, as the current of a small motor allows.

@@ -11,8 +11,15 @@ from katana450.arm.control.objects.environment import Environment
 from katana450.arm.control.state.scene_objects import SceneObject, Shape, named
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import Cup, WaterEnvironment
-from katana450.maths.water.flow import VesselMove, VesselWater, Water, WaterFlow
-from katana450.maths.water.motion import Course, MotionWithWater, VesselMotion
+from katana450.maths.water.flow import (
+    Course,
+    MotionWithWater,
+    VesselMotion,
+    VesselMove,
+    VesselWater,
+    Water,
+    WaterFlow,
+)
 from katana450.maths.water.units import counted
 from katana450.maths.water.vectors import Vector, add, scale, sub, vector
 

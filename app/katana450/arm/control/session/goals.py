@@ -8,9 +8,9 @@ import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands.commands import JOG_TIME, ClearStop, Command, Servo, TimedServo
-from katana450.arm.control.state.following import Following
 from katana450.arm.control.state.modes import (
     IDLE,
+    Following,
     Intent,
     JointTarget,
     Leaving,
@@ -81,7 +81,6 @@ def end_drag(state: State) -> State:
             return with_mode(state, replace(tracking, let_go=True))
         case Positioning() as positioning:
             state = replace(state, goal=state.setpoint if state.blocked else state.goal)
-            # A detour stays on offer: it leads from where the arm rests.
             ended = replace(positioning, target=JointTarget(state.goal))
             return with_mode(replace(state, blocked=False), ended)
     goal = state.setpoint if state.blocked else state.goal
@@ -160,38 +159,8 @@ def follow_plan(arm: ArmModel, state: State, plan: Plan, tau: float) -> State:
         axis = int(distances.argmax())
         finding = Finding(Reason.NOT_AT_START, float(distances[axis]), axis)
         return replace(state, findings=(*state.findings, finding))
-    return _along(arm, state, Following.begin(plan, tau))
-
-
-def may_offer(state: State, plan: Plan) -> bool:
-    """Return whether ``plan`` is a detour from the rest of ``state`` to its pose beyond a gap."""
-    beyond = state.beyond_gap
-    if beyond is None or state.moving or state.paused or state.blocked:
-        return False
-    at_start = np.abs(state.setpoint - plan.start).max() <= START_TOLERANCE
-    return bool(at_start and (plan.end == beyond.q).all())
-
-
-def with_detour(state: State, plan: Plan | None) -> State:
-    """Return ``state`` with ``plan`` as its detour on offer; None withdraws the offer."""
-    positioning = state.mode
-    if not isinstance(positioning, Positioning) or positioning.detour is plan:
-        return state
-    return replace(state, mode=replace(positioning, detour=plan))
-
-
-def go_on_detour(state: State, findings: tuple[Finding, ...]) -> State:
-    """Return ``state`` that follows its detour. findings: the losses at its end."""
-    assert state.detour is not None
-    following = Following.begin(state.detour)
-    return with_goal(state, following.goal, findings, following)
-
-
-def move_along_plan(arm: ArmModel, state: State, fraction: float) -> State:
-    """Return ``state`` that moves on its plan, forward or back, to ``fraction`` of it (0 to 1)."""
-    assert isinstance(state.mode, Following)
-    towards = fraction * state.mode.plan.span
-    return _along(arm, state, replace(state.mode, towards=towards))
+    branch = arm.kinematics.branch_of(plan.end)
+    return with_goal(replace(state, branch=branch), plan.end, (), Following.begin(plan, tau))
 
 
 def with_place(state: State, along: Following | None) -> State:
@@ -201,10 +170,3 @@ def with_place(state: State, along: Following | None) -> State:
     if isinstance(state.mode, Leaving):
         return replace(state, mode=replace(state.mode, along=along))
     return replace(state, mode=along)
-
-
-def _along(arm: ArmModel, state: State, following: Following) -> State:
-    """Return ``state`` with its goal where ``following`` ends."""
-    goal = following.goal
-    branch = arm.kinematics.branch_of(goal)
-    return with_goal(replace(state, branch=branch), goal, (), following)

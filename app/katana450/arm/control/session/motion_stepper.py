@@ -13,12 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.joints import JointSet
+from katana450.arm.control.arm import ArmModel, JointSet
 from katana450.arm.control.session.goals import with_place
 from katana450.arm.control.session.plan_follower import PlanFollower
-from katana450.arm.control.state.following import Following
-from katana450.arm.control.state.modes import Leaving
+from katana450.arm.control.state.modes import Following, Leaving
 from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.arm.control.tool_kinematics import ELBOW, ToolKinematics
 from katana450.maths.collision.clearance import (
@@ -27,7 +25,7 @@ from katana450.maths.collision.clearance import (
     advance,
     is_surely_clear,
 )
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain

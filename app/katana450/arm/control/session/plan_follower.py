@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.state.following import Following
+from katana450.arm.control.state.modes import Following
 from katana450.maths.collision.clearance import MIN_CLEARANCE
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.motion.limiter import Limiter, Limits
 from katana450.maths.planning.clearance import SweptClearance
@@ -48,7 +48,9 @@ class PlanFollower:
     def ahead(self, now: Following, dt: float, fraction: float) -> Following:
         """Return the place after ``dt`` [s], at most at ``fraction`` of the speed of the plan."""
         place = now.turned_over()
-        pace = self._limiter(place).towards(place.pace, np.array([place.aim]), dt, fraction)
+        pace = self._limiter(place).towards(
+            place.pace, np.array([place.segment.scaling.span]), dt, fraction
+        )
         return replace(place, pace=pace)
 
     def braking(self, now: Following, dt: float) -> Following:
@@ -81,8 +83,8 @@ class PlanFollower:
         fingers: the finger joint [rad or m].
         """
         place = now.turned_over()
-        reach = PROBE_FRACTION * place.segment.scaling.span
-        probe = min(max(place.aim, place.local - reach), place.local + reach)
+        span = place.segment.scaling.span
+        probe = min(span, place.local + PROBE_FRACTION * span)
         return self._met(place, place.at(probe), fingers) is None
 
     def _met(self, place: Following, stopping_point: Following, fingers: float) -> Contact | None:

@@ -8,24 +8,21 @@ from dataclasses import replace
 import numpy as np
 
 from katana450 import tolerances
-from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.arm import ArmModel, JointSet
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.joints import JointSet
-from katana450.arm.control.objects.environment import Environment, Hand
+from katana450.arm.control.objects.environment import Environment, Hand, obstacle_of
 from katana450.arm.control.objects.grip import gripped
 from katana450.arm.control.objects.loose_objects import LooseObjects
 from katana450.arm.control.objects.pouring import Pouring
 from katana450.arm.control.objects.scene_changes import with_scene_change
 from katana450.arm.control.session import tool_targets
-from katana450.arm.control.session.checks import check, check_joints
+from katana450.arm.control.session.checks import check, check_joints, outcome, take_all
 from katana450.arm.control.session.goals import (
     end_drag,
     end_stream,
     follow_plan,
-    move_along_plan,
     paused,
     resumed,
-    with_detour,
     with_goal,
     with_mode,
     with_stream_sample,
@@ -34,8 +31,6 @@ from katana450.arm.control.session.goals import (
     without_finding,
 )
 from katana450.arm.control.session.motion_stepper import MotionStepper, Travel, no_travel
-from katana450.arm.control.session.outcome import outcome, take_all
-from katana450.arm.control.session.slow_zones import SLOW_SPEED, SlowZones, with_slow_zone
 from katana450.arm.control.session.stopping import stopped_again, with_presses
 from katana450.arm.control.session.supervision import (
     held_where_measured,
@@ -59,13 +54,69 @@ from katana450.arm.control.state.modes import (
     Positioning,
     Tracking,
 )
-from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.scene_objects import SceneObject, Zone
 from katana450.arm.control.state.state import ACCEPTED, ActiveStop, Finding, Outcome, Reason, State
 from katana450.errors import InputError
+from katana450.maths.collision.clearance import path_lengths
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import BRANCHES
+from katana450.maths.motion.limiter import JointMotion
+from katana450.maths.physics.model import BoolArray
 from katana450.maths.water.environment import WaterEnvironment
+
+SLOW_SPEED = 0.25
+"""[m/s] Maximum speed of the tool point while a part of the arm is in such a zone: that of
+ISO 10218-1 for an arm beside people."""
+
+ZONE_MARGIN = 0.05
+"""[m] Distance from the zone at which the arm is no longer slow, once it was."""
+
+
+class SlowZones:
+    """The zones of reduced speed around one arm. Its methods are pure."""
+
+    def __init__(self, environment: Environment) -> None:
+        """Create the rules of the arm in ``environment``."""
+        self._environment = environment
+        # Cache for the zones of the newest state.
+        self._cache: tuple[list[SceneObject], CollisionWorld, BoolArray] | None = None
+
+    def finding(self, state: State, stepper: MotionStepper) -> Finding | None:
+        """Return that the arm is in a zone, or could come to rest only in one; None if not."""
+        zones = [item for item in state.objects if item.zone is Zone.SLOW]
+        world = self._environment.bodies
+        if not zones or world is None or not state.moving:
+            return None
+        if self._cache is None or self._cache[0] != zones:
+            world = world.with_obstacles([obstacle_of(item) for item in zones])
+            names = {item.name for item in zones}
+            of_zone = np.array([world.parts[part].name in names for part in world.part_of.tolist()])
+            self._cache = zones, world, of_zone[world.first] | of_zone[world.second]
+        _, world, pairs = self._cache
+        x, end = state.x_setpoint, stepper.stopping_point(state)[0]
+        rest = np.append(end, x[-1])
+        placed, placed_at_rest = world.at(x), world.at(rest)
+        lengths = path_lengths(world, placed, x, rest - x)
+        was_slow = any(finding.reason is Reason.SLOW_ZONE for finding in state.findings)
+        margin = ZONE_MARGIN if was_slow else 0.0
+        for pair in placed.nearer_than(np.where(pairs, lengths + margin, -np.inf))[0].tolist():
+            distances = placed.distance(pair) + placed_at_rest.distance(pair)
+            # The least distance on the way to rest is at least this.
+            if 0.5 * (distances - lengths[pair]) < margin:
+                one, other = placed.contact(pair).parts
+                is_zone = any(item.name == one for item in zones)
+                parts = (other, one) if is_zone else (one, other)
+                return Finding(Reason.SLOW_ZONE, SLOW_SPEED, parts=parts)
+        return None
+
+
+def with_slow_zone(state: State, finding: Finding | None) -> State:
+    """Return ``state`` with ``finding`` in place of that of an earlier zone."""
+    others = tuple(other for other in state.findings if other.reason is not Reason.SLOW_ZONE)
+    findings = others if finding is None else (*others, finding)
+    return state if findings == state.findings else replace(state, findings=findings)
+
 
 TOOL_SPEED = 0.5
 """[m/s] Default maximum speed of the tool point: a person can follow it."""
@@ -141,10 +192,12 @@ class Session:
         gripper: the finger joint [rad or m]. t: now [s].
         """
         q = frozen(q)
-        if self.arm is None:
-            return State.standing(q, gripper, t, "", NO_BRANCH)
-        branch = self.arm.kinematics.branch_of(q)
-        return State.standing(q, gripper, t, self.arm.default_tool, branch, self._objects)
+        arm, held = self.arm, JointMotion.rest(q)
+        standing = State(t, q, gripper, held, gripper, q, gripper, tool="", branch=NO_BRANCH)
+        if arm is None:
+            return standing
+        tool, branch = arm.default_tool, arm.kinematics.branch_of(q)
+        return replace(standing, tool=tool, branch=branch, objects=self._objects)
 
     def require_arm(self) -> ArmModel:
         """Return the arm. Raises InputError, with the reason, if only joints can be driven."""
@@ -264,8 +317,6 @@ class Session:
 
     def _accepted(self, state: State, command: cmd.Command) -> State:
         """Return ``state`` after a command that leaves the mode as it is."""
-        if not command.traits.keeps_detour:
-            state = with_detour(state, None)
         match command:
             case cmd.Pause(finding=cause):
                 return paused(state, cause)
@@ -281,8 +332,6 @@ class Session:
                 return replace(state, priority=priority)
             case cmd.EndDrag():
                 return end_drag(state)
-            case cmd.OfferDetour(plan=plan):
-                return with_detour(state, plan)
             case cmd.Gripper(angle=angle):
                 return self._grip(without_cause(state), angle)
         return with_scene_change(self.environment, self.pouring, state, command)
@@ -290,8 +339,6 @@ class Session:
     def _continued(self, state: State, command: cmd.Command) -> State:
         """Return ``state`` after a command that the present mode continues with."""
         match command:
-            case cmd.GoAlong(fraction=fraction):
-                return move_along_plan(self.require_arm(), state, fraction)
             case cmd.EndDrag():
                 return end_drag(state)
             case cmd.SetPriority(priority=priority):
@@ -353,13 +400,11 @@ class Session:
                 return tool_targets.stepped(arm, state, command)
             case cmd.Pose(target=T):
                 return tool_targets.with_pose_target(arm, state, PoseTarget(T))
-            case cmd.Branch(full_name=name):
+            case cmd.Branch(name=name):
                 return tool_targets.with_branch(arm, state, branch_named(arm, name))
             case cmd.Tool(name=name):
                 # The goal stays, and the target becomes the goal.
                 return self._aim(replace(state, tool=name), state.goal)
-            case cmd.Go():
-                return tool_targets.gone(arm, state)
             case cmd.Follow(plan=plan, tau=tau):
                 return follow_plan(arm, state, plan, tau)
         raise AssertionError(f"The table of transitions has no rule for {command!r}.")

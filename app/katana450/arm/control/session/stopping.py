@@ -1,14 +1,18 @@
-"""Rules of a stop: what repeated stops change, and when a stop may be cleared."""
+"""Rules of a stop: what silence and repeated stops do, and when a stop may be cleared."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from enum import Enum
 
-from katana450.arm.control.commands.commands import Stop
-from katana450.arm.control.state.state import State
+from katana450.arm.control.commands.commands import HoldFor, PauseFor, Stop
+from katana450.arm.control.state.messages import finding_text
+from katana450.arm.control.state.modes import IDLE
+from katana450.arm.control.state.state import ActiveStop, Finding, Reason, State
 from katana450.arm.control.state.stop_cause import StopCause
+from katana450.maths.motion.limiter import JointMotion
 
 HOLD_OFF = 1.0
 """[s] Time after the newest STOP in which it cannot be cleared."""
@@ -73,3 +77,81 @@ def joined(first: Stop, second: Stop) -> Stop:
         # A stop without a name always counts, so the two together do too.
         cause, others = replace(cause, press=""), (cause.press, *others)
     return Stop(cause, first.finding, others[-REPORTED_PRESSES:])
+
+
+PAUSE_TIMEOUT = 5.0
+"""[s] Silence after which a pause becomes a latched stop."""
+
+
+class SilenceProfile(Enum):
+    """Reaction of a moving arm to a silent driver, a silent process or a late control loop.
+
+    The heartbeat timeout is the same in both. The driver in use chooses the profile.
+    """
+
+    REAL_ARM = "real arm"
+    """The arm stops, and the stop is latched: somebody may stand beside it."""
+    SIMULATION = "simulation"
+    """The arm pauses: it brakes and drops its targets, and the next command moves it. A program
+    keeps its path if only the page's server was silent. Silence of PAUSE_TIMEOUT latches the stop.
+    """
+
+    def braking(
+        self, cause: Finding, silence: float, *, resumes: bool = False
+    ) -> Stop | HoldFor | PauseFor:
+        """Return the command for a moving arm after ``silence`` [s], for the reason ``cause``.
+
+        resumes: whether a program drives that may resume by itself.
+        """
+        if self is SilenceProfile.REAL_ARM or silence >= PAUSE_TIMEOUT:
+            return Stop(StopCause(f"{finding_text(cause)}."), cause)
+        return PauseFor(cause) if resumes else HoldFor(cause)
+
+
+RESTARTED = (Finding(Reason.STOPPED), Finding(Reason.RESTARTED))
+"""Findings of an arm that waits for Clear stop after its process was started again."""
+
+RESTART_CAUSE = StopCause(f"{finding_text(RESTARTED[1])}.")
+"""Cause of that stop."""
+
+
+def at_rest(state: State) -> State:
+    """Return the part of ``state`` that outlasts the process of the arm, at rest and stopped.
+
+    The joints and the gripper keep their place, and all targets are dropped.
+    """
+    return replace(
+        state,
+        motion=JointMotion.rest(state.q),
+        gripper_setpoint=state.gripper,
+        goal=state.q,
+        gripper_goal=state.gripper,
+        findings=RESTARTED,
+        blocked=False,
+        stopped=ActiveStop(0.0, 0.0, RESTART_CAUSE),
+        paused=False,
+        mode=IDLE,
+        outcomes=(),
+    )
+
+
+def restarted(first_state: State, last_state: State | None) -> State:
+    """Return the first state of a new process, stopped and with the scene of the last state.
+
+    last_state: the last known one of the process before; None if none is known. The place of the
+    arm is that of ``first_state``, which its driver reports.
+    """
+    stopped = at_rest(first_state)
+    if last_state is None:
+        return stopped
+    return replace(
+        stopped,
+        tool=last_state.tool,
+        priority=last_state.priority,
+        speed=last_state.speed,
+        objects=last_state.objects,
+        grip=last_state.grip,
+        squeeze=last_state.squeeze,
+        poured=last_state.poured,
+        appearance=last_state.appearance,
+    )

@@ -13,7 +13,7 @@ from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.modes import IDLE
 from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.arm.control.state.stop_cause import StopCause
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.motion.limiter import JointMotion

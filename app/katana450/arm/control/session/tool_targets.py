@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands.tool_commands import StepTool, TurnCommand
-from katana450.arm.control.session.goals import go_on_detour, with_goal, with_mode
+from katana450.arm.control.session.goals import with_goal, with_mode
 from katana450.arm.control.state.findings import of_elbow, of_jog
 from katana450.arm.control.state.messages import excluded
 from katana450.arm.control.state.modes import (
@@ -24,31 +23,34 @@ from katana450.arm.control.state.modes import (
 from katana450.arm.control.state.state import CAUSES, GRIPPER_REASONS, Reason, State
 from katana450.errors import InputError
 from katana450.maths.collision.clearance import MIN_CLEARANCE
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body
 from katana450.maths.kinematics.projection import Projection
-from katana450.maths.kinematics.solution import Solution
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame, singular_values
 from katana450.maths.motion.arm_angle import elbow_turn
 
 
 @dataclass(frozen=True, eq=False)
-class BranchMetrics:
-    """One branch at a pose, with its cost and its quality.
+class BranchOption:
+    """A branch that the arm can change to, with its cost and its quality.
 
     Attributes:
         branch: the branch.
-        q: joint angles (n,) of the branch [rad].
+        q: joint angles (n,) of the branch [rad]; of the nearest posture on another one if the arm
+            cannot take the branch.
         within_limits: True if the arm can go there.
         position_error, rotation_error: difference [m], [rad] from the pose.
-        distance: the largest angle that any joint has to turn [rad].
+        distance: the largest angle that any joint has to turn [rad]. Inside the limits the straight
+            path in joint space is one that the arm can follow.
         time: duration until all joints are there, each at its own maximum speed [s].
         smallest_singular_value: 0 in a singularity [1].
+        contact: the contact that the arm would have at its end; None if there is none.
+        refusal: why the arm cannot take the branch; empty if it can.
     """
 
     branch: AnyBranch
@@ -59,40 +61,7 @@ class BranchMetrics:
     distance: float
     time: float
     smallest_singular_value: float
-
-    @staticmethod
-    def of(chain: Chain, posture: Solution | Projection, q: npt.ArrayLike) -> BranchMetrics:
-        """Return the metrics of `posture`, seen from the joint angles `q` (n,) [rad].
-
-        Between two postures inside the limits the straight path in joint space is inside too, so
-        distance and time belong to a path that the arm can follow.
-        """
-        turns = np.abs(posture.q - chain.check_q(q))
-        return BranchMetrics(
-            branch=posture.branch,
-            q=posture.q,
-            within_limits=chain.within_limits(posture.q),
-            position_error=posture.position_error,
-            rotation_error=posture.rotation_error,
-            distance=float(turns.max()),
-            time=float((turns / chain.speed).max()),
-            smallest_singular_value=float(singular_values(chain, posture.q)[-1]),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class BranchOption:
-    """A branch that the arm can change to.
-
-    Attributes:
-        metrics: its posture, cost and distance from a singularity.
-        contact: the contact that the arm would have at its end; None if there is none.
-        refusal: why the arm cannot take the branch; empty if it can. If it cannot, the metrics are
-            those of the nearest posture on another one.
-    """
-
-    metrics: BranchMetrics
-    contact: Contact | None
+    contact: Contact | None = None
     refusal: str = ""
 
 
@@ -146,16 +115,24 @@ def branch_options(
 
     world: the collision world; without one no contacts are reported.
     """
-    chain = arm.chain_to(state.tool)
-    candidates = [(branch, branch_option(arm, state, branch)) for branch in arm.kinematics.branches]
-    return tuple(
-        BranchOption(
-            replace(BranchMetrics.of(chain, best, state.q), branch=branch),
-            contact_at(world, best.q, state.gripper),
-            branch_refusal(branch, best),
+    chain, options = arm.chain_to(state.tool), []
+    for branch in arm.kinematics.branches:
+        best = branch_option(arm, state, branch)
+        turns = np.abs(best.q - state.q)
+        option = BranchOption(
+            branch=branch,
+            q=best.q,
+            within_limits=chain.within_limits(best.q),
+            position_error=best.position_error,
+            rotation_error=best.rotation_error,
+            distance=float(turns.max()),
+            time=float((turns / chain.speed).max()),
+            smallest_singular_value=float(singular_values(chain, best.q)[-1]),
+            contact=contact_at(world, best.q, state.gripper),
+            refusal=branch_refusal(branch, best),
         )
-        for branch, best in candidates
-    )
+        options.append(option)
+    return tuple(options)
 
 
 def branch_refusal(branch: AnyBranch, best: Projection) -> str:
@@ -231,14 +208,6 @@ def tracked(arm: ArmModel, state: State, tracking: Tracking) -> State:
     findings = kinematics.tracking_losses(state, progress)
     mode = Positioning(target, progress.beyond_gap)
     return with_goal(state, progress.best.q, findings, mode)
-
-
-def gone(arm: ArmModel, state: State) -> State:
-    """Return ``state`` that follows the detour on offer to the pose beyond the gap."""
-    assert state.beyond_gap is not None
-    kinematics = arm.kinematics_to(state.tool)
-    losses = kinematics.losses(state, state.beyond_gap, yaw_was_given=False)
-    return go_on_detour(state, losses)
 
 
 def with_reapplied_priority(arm: ArmModel, state: State) -> State:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.state.following import Following
 from katana450.arm.control.state.modes import (
     MODES,
+    Following,
     Idle,
     Jogging,
     Mode,
@@ -74,9 +74,6 @@ TABLE: Mapping[type[cmd.Command], Row] = {
     cmd.TurnElbow: _row(Jogging,       S,   S,   S,   C,   S,   S),
     cmd.Servo: _row(Servoing,          S,   S,   S,   S,   C,   S),
     cmd.Follow: _row(Following,        S,   S,   S,   S,   S,   S),
-    cmd.GoAlong: _row(None,            R,   R,   R,   R,   R,   C),
-    cmd.OfferDetour: _row(None,        R,   A,   R,   R,   R,   R),
-    cmd.Go: _row(Following,            R,   S,   R,   R,   R,   R),
     cmd.Stop: _row(Idle,               S,   S,   S,   S,   S,   S),
     cmd.ClearStop: _row(Idle,          S,   S,   S,   S,   S,   S),
     # A jog ends along its twist, as without renewal.

@@ -1,15 +1,18 @@
-"""Findings: the reasons with numbers why the goal is not the target, most useful first."""
+"""Findings on why the goal is not the target, most useful first, and the margins of a posture."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from katana450 import tolerances
-from katana450.arm.control.state.state import Finding, Reason
+from katana450.arm.control.state.state import Finding, Reason, State
+from katana450.maths.collision.engine import Contact
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
@@ -19,7 +22,12 @@ from katana450.maths.kinematics.projection import (
     Projection,
 )
 from katana450.maths.kinematics.tracker import Tracked
-from katana450.maths.kinematics.velocity import limit_distances, limited_jog
+from katana450.maths.kinematics.velocity import (
+    limit_distances,
+    limited_jog,
+    nearest_limit,
+    singular_values,
+)
 from katana450.maths.motion.arm_angle import elbow_path
 from katana450.maths.motion.limiter import Limits
 
@@ -148,3 +156,65 @@ def of_tracked(chain: Chain, tracked: Tracked, priority: Priority) -> tuple[Find
             for f in losses
         )
     return (held, *losses)
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """Distances of one posture from its boundaries.
+
+    Attributes:
+        limits: (n,) the distance of each axis to its nearer limit [rad]; negative beyond it.
+        axis: the axis nearest to one of its limits, counted from 0, of those that turn.
+        singular_values: (n,) those of the Jacobian over the characteristic length [1], in falling
+            order.
+        nearest: the nearest pair of parts; None if contacts are not checked.
+    """
+
+    limits: FloatArray
+    axis: int
+    singular_values: FloatArray
+    nearest: Contact | None
+
+
+def margins(chain: Chain, world: CollisionWorld | None, x: FloatArray) -> Margins:
+    """Return the margins of one posture.
+
+    Args:
+        chain: the chain, which ends in the tool.
+        world: the collision world; None to check no contacts.
+        x: (n + 1,) the joints and the finger joint [rad].
+    """
+    q = x[: chain.n]
+    nearest = None if world is None else world.nearest(x)
+    limits = limit_distances(chain, q)
+    return Margins(limits, nearest_limit(chain, limits), singular_values(chain, q), nearest)
+
+
+class LogEntry(NamedTuple):
+    """The start or the end of one finding, with the numbers it had then.
+
+    Attributes:
+        t: time [s] on the clock of the states.
+        finding: the finding.
+        began: True if the finding began; False if it ended.
+    """
+
+    t: float
+    finding: Finding
+    began: bool
+
+
+def entries_between(before: State | None, after: State) -> tuple[LogEntry, ...]:
+    """Return the entries for findings of ``before`` that ended and of ``after`` that began.
+
+    A finding that stays makes no entry, even if its amount changes. Without ``before`` all begin.
+    """
+    earlier = () if before is None else before.findings
+    old, new = ({_key(finding) for finding in findings} for findings in (earlier, after.findings))
+    began = tuple(LogEntry(after.t, f, True) for f in after.findings if _key(f) not in old)
+    ended = tuple(LogEntry(after.t, f, False) for f in earlier if _key(f) not in new)
+    return (*ended, *began)
+
+
+def _key(finding: Finding) -> tuple[Reason, int | None, tuple[str, str] | None]:
+    return finding.reason, finding.axis, finding.parts

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from katana450.arm.control.state.state import CAUSES, Finding, Reason, State, Status
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING
 
 AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
 
@@ -271,17 +270,10 @@ def sentence(state: State) -> str:
 
 
 def _reason(state: State, finding: Finding) -> str:
-    """Return the text of one finding; that of a gap offers the detour, if there is one."""
+    """Return the text of one finding of ``state``."""
     if finding.reason is Reason.NOT_FOLLOWING and state.report is not None and state.report.note:
         return state.report.note.removesuffix(".")
-    if finding.reason is not Reason.ACROSS_GAP or state.detour is None:
-        return REASONS[finding.reason](finding)
-    beyond = state.beyond_gap
-    exact = beyond is not None and beyond.position_error <= POSITION_WORTH_TELLING
-    seconds = state.detour.duration / state.speed
-    detour = f"a {seconds:.1f} s detour"
-    reached = f"reachable by {detour}" if exact else f"{detour} leads nearer"
-    return f"{reached}: press Enter or Go"
+    return REASONS[finding.reason](finding)
 
 
 def finding_text(finding: Finding) -> str:

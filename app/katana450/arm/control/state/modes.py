@@ -11,13 +11,86 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from katana450.arm.control.state.following import Following
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
+from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
-from katana450.maths.planning.plan import Plan
+from katana450.maths.planning.plan import Plan, Segment
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """Place of the arm on a plan. It is a mode of the session: the goal is the end of the plan.
+
+    Attributes:
+        plan: the plan.
+        number: index of the segment that the arm is on, from 0.
+        pace: tau in that segment [s], and its first two derivatives by time, (1,) each.
+    """
+
+    plan: Plan
+    number: int
+    pace: JointMotion
+
+    @staticmethod
+    def begin(plan: Plan, tau: float = 0.0) -> Following:
+        """Return the place of rest at ``tau`` [s] of ``plan``, on the way to its end."""
+        number = plan.segment_at(tau)
+        local = np.array([tau - plan.begins[number]])
+        return Following(plan, number, JointMotion.rest(local))
+
+    @property
+    def segment(self) -> Segment:
+        """The segment that the arm is on."""
+        return self.plan.segments[self.number]
+
+    @property
+    def local(self) -> float:
+        """Tau in the present segment [s]."""
+        return float(self.pace.q[0])
+
+    @property
+    def tau(self) -> float:
+        """Tau of the arm on the whole plan [s]."""
+        return self.plan.begins[self.number] + self.local
+
+    @property
+    def fraction(self) -> float:
+        """Fraction of the plan that the arm has completed, from 0 to 1."""
+        return min(self.tau / self.plan.span, 1.0)
+
+    @property
+    def at_end(self) -> bool:
+        """True if the arm is at rest at the end of the segment."""
+        return self.pace.at_rest and self.local == self.segment.scaling.span
+
+    @property
+    def there(self) -> bool:
+        """True if the arm is at rest at the end of the plan."""
+        return self.at_end and self.number == len(self.plan.segments) - 1
+
+    def at(self, tau: float) -> Following:
+        """Return the place of rest at ``tau`` of the same segment [s]."""
+        return replace(self, pace=JointMotion.rest(np.array([tau])))
+
+    def turned_over(self) -> Following:
+        """Return the place on the next segment if the present one is done and another follows."""
+        if not self.at_end or self.there:
+            return self
+        return replace(self, number=self.number + 1).at(0.0)
+
+    def motion(self) -> JointMotion:
+        """Return the motion of the joints at this place."""
+        if self.there:
+            return JointMotion.rest(self.plan.end)
+        moving = self.segment.at(self.local)
+        if self.pace.at_rest:
+            return JointMotion.rest(moving.q)
+        v, a = float(self.pace.qd[0]), float(self.pace.qdd[0])
+        qdd = v * v * moving.second + a * moving.first
+        return JointMotion(moving.q, frozen(v * moving.first), frozen(qdd))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +126,10 @@ class Positioning:
         target: the target, or the goal after the end of a drag.
         beyond_gap: the pose nearer to the target of a drag that only a leap would reach, on the
             same branch; None without one.
-        detour: the offered plan from the goal to that pose; None without an offer.
     """
 
     target: Target
     beyond_gap: Projection | None = None
-    detour: Plan | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ import numpy as np
 
 from katana450.arm.control.state.appearance import ALL_AS_MADE, Appearance
 from katana450.arm.control.state.arm_report import ArmMode, ArmReport
-from katana450.arm.control.state.following import Following
 from katana450.arm.control.state.modes import (
     IDLE,
+    Following,
     Idle,
     Jogging,
     JointTarget,
@@ -33,9 +33,8 @@ from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
-from katana450.maths.physics.body import BodyMotion
-from katana450.maths.planning.plan import Plan
-from katana450.maths.water.motion import MotionWithWater
+from katana450.maths.physics.model import BodyMotion
+from katana450.maths.water.flow import MotionWithWater
 
 
 class Status(Enum):
@@ -259,29 +258,6 @@ class State:
     astray_since: float | None = None
     outcomes: tuple[Outcome, ...] = ()
 
-    @staticmethod
-    def standing(
-        q: FloatArray,
-        gripper: float,
-        t: float,
-        tool: str,
-        branch: AnyBranch,
-        objects: tuple[SceneObject, ...] = (),
-    ) -> State:
-        """Return the state of joints that stand at ``q`` (n,) and hold, without a target."""
-        return State(
-            t=t,
-            q=q,
-            gripper=gripper,
-            motion=JointMotion.rest(q),
-            gripper_setpoint=gripper,
-            goal=q,
-            gripper_goal=gripper,
-            tool=tool,
-            branch=branch,
-            objects=objects,
-        )
-
     @property
     def status(self) -> Status:
         """The status that follows from the findings, the stop and the pause."""
@@ -348,13 +324,8 @@ class State:
 
     @property
     def beyond_gap(self) -> Projection | None:
-        """The pose of a drag that only a leap or a detour reaches; None without one."""
+        """The pose of a drag that only a leap reaches; None without one."""
         return self.intent.beyond_gap if isinstance(self.intent, Positioning) else None
-
-    @property
-    def detour(self) -> Plan | None:
-        """The plan that ``Go`` follows; None without an offer."""
-        return self.intent.detour if isinstance(self.intent, Positioning) else None
 
     @cached_property
     def moving(self) -> bool:

@@ -16,17 +16,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.session.outcome import refused
-from katana450.arm.control.session.silence import SilenceProfile
+from katana450.arm.control.lease import Actor
+from katana450.arm.control.session.checks import refused
+from katana450.arm.control.session.stopping import SilenceProfile
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.arm.runtime.loop import ControlLoop
-from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import Mailbox
-from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.pipes.guarded_pipe import GuardedPipe
-from katana450.arm.runtime.pipes.state_publisher import Snapshot
+from katana450.arm.runtime.pipes.state_publisher import LoopTiming, Snapshot, TicketOutcome
 from katana450.arm.runtime.pipes.wire import PlanNames
 from katana450.arm.runtime.readiness import writable
 from katana450.errors import InputError
@@ -161,7 +159,7 @@ class ArmEnd:
             self._mailbox.put(cmd.Stop())
 
     def _put(self, message: CommandMessage) -> None:
-        if isinstance(message.command, cmd.Follow | cmd.OfferDetour):
+        if isinstance(message.command, cmd.Follow):
             self._names.note(message.number, message.command.plan)
         with self._numbering:
             try:

@@ -11,9 +11,9 @@ from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.session.outcome import DROPPED
+from katana450.arm.control.lease import Actor
+from katana450.arm.control.session.checks import DROPPED
 from katana450.arm.control.session.stopping import joined
 from katana450.arm.control.state.scene_objects import same
 from katana450.arm.runtime.clock import MonotonicClock
@@ -125,7 +125,7 @@ class FrontEnd:
                     f"The arm's process has not answered for {age:.1f} s: only STOP is accepted."
                 )
             number = self._number = self._number + 1
-            if isinstance(command, cmd.Follow | cmd.OfferDetour):
+            if isinstance(command, cmd.Follow):
                 self._plans.note(number, command.plan)
             # Read before the command is sent: afterwards the arm may move already.
             state = self.state_publisher.snapshot.state

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from katana450.arm.control.actor import Actor
+from katana450.arm.control.lease import Actor
 from katana450.arm.control.state.stop_cause import StopCause
 
 STATUS_INTERVAL = 0.14

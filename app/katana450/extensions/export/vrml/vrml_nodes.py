@@ -17,8 +17,8 @@ import numpy as np
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.environment import Environment
+from katana450.arm.control.objects.loose_objects import check_carried, is_loose
 from katana450.arm.control.objects.scene_changes import appearance_of, with_moved_object
-from katana450.arm.control.objects.support import check_carried, is_loose
 from katana450.arm.control.state.appearance import AppearanceTrait, Colour
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State

@@ -17,8 +17,7 @@ import yaml
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
-from katana450.arm.robot.initial_scene import InitialScene
-from katana450.arm.robot.object_meshes import Mesh
+from katana450.arm.robot.object_meshes import InitialScene, Mesh
 from katana450.atomic import bytes_of
 from katana450.errors import InputError
 from katana450.extensions.importers.archive import (

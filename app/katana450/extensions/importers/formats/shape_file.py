@@ -14,7 +14,7 @@ from enum import Enum
 
 import numpy as np
 
-from katana450.arm.robot.creases import Colours
+from katana450.arm.robot.surfaces import Colours
 from katana450.errors import InputError, digits_beyond
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, Companions, packed, unpacked
 from katana450.extensions.importers.formats.gltf_file import read_gltf

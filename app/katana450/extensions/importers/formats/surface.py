@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.robot.creases import Colours
+from katana450.arm.robot.surfaces import Colours
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.state.following import Following
+from katana450.arm.control.state.modes import Following
 from katana450.arm.control.state.state import Reason, State
 from katana450.errors import InputError
 from katana450.maths.planning.plan import Plan

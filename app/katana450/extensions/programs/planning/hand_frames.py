@@ -13,13 +13,19 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from katana450.arm.control.arm import GripperModel
 from katana450.arm.control.objects.environment import Hand
-from katana450.arm.control.objects.gripper_model import GripperModel
 from katana450.arm.control.objects.pouring import is_vessel
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.errors import InputError
-from katana450.extensions.hands.placed_bodies import PlacedBodies
-from katana450.extensions.hands.sides import MIN_STROKE, SNAP_COSINE, frames_of, sides_of, snapped
+from katana450.extensions.hands.sides import (
+    MIN_STROKE,
+    SNAP_COSINE,
+    PlacedBodies,
+    frames_of,
+    sides_of,
+    snapped,
+)
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen

@@ -14,8 +14,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.modes import IDLE
 from katana450.arm.control.state.state import State
-from katana450.arm.drivers.driver import Driver
-from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.drivers.driver import Driver, SimulatedDriver
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.tick import driven
 from katana450.assembly.robot_session import describe_robot

@@ -17,8 +17,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.velocity import singular_values
 from katana450.maths.planning.path import CurvePath, point_derivatives
-from katana450.maths.water.flow import Water
-from katana450.maths.water.motion import Course
+from katana450.maths.water.flow import Course, Water
 from katana450.maths.water.units import MILLILITRE
 
 MEASURES: Final = {

@@ -19,7 +19,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -33,8 +33,7 @@ from katana450.extensions.water import WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.water.flow import Water
-from katana450.maths.water.motion import MotionWithWater
+from katana450.maths.water.flow import MotionWithWater, Water
 from katana450.server.view.layer import FolderContext
 from katana450.server.view.scene import Colour, GhostNodes, Window
 from katana450.server.view.scene_objects import ObjectShape

@@ -8,9 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from katana450.arm.control.actor import SERVER, CommandChannel
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.lease import SERVER, CommandChannel, Person, Role
 from katana450.arm.control.state.modes import Idle
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError, LeaseError

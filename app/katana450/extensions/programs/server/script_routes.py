@@ -13,7 +13,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.lease import CommandChannel
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import MAX_BYTES, ScriptError
 from katana450.extensions.programs.script.script import parse, script_schema

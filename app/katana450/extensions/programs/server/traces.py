@@ -8,7 +8,7 @@ import viser
 
 from katana450.arm.control.state.modes import Jogging, Positioning, Servoing, Tracking
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.arm_reader import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.jet import Jet

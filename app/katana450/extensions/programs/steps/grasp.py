@@ -25,7 +25,7 @@ from katana450.extensions.programs.building.step import Conditional, Held, Step
 from katana450.extensions.programs.language.kinds import Object, angle, choice, millimetres
 from katana450.extensions.programs.planning.curves import line_between
 from katana450.extensions.programs.planning.hand_frames import ABOVE, DOWN, FRONT, LOW, Approach
-from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import AnyBranch

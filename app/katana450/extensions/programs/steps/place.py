@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from katana450.arm.control.objects.loose_objects import check_carried, is_over, surface_below
 from katana450.arm.control.objects.pouring import BASIN, is_vessel
-from katana450.arm.control.objects.support import check_carried, is_over, surface_below
 from katana450.arm.control.state.scene_objects import MAX_COORDINATE, SceneObject
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import MoveFingers

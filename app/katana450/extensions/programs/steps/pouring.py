@@ -3,7 +3,7 @@
 An arm of the five-axis family rolls the vessel by its wrist. Other arms tilt it about its lip.
 
 The tilt is the inverse of the flow over the lip of the cup. The surface is level and at rest. See
-``maths/water/lip.py`` for the rules.
+``maths/water/flow.py`` for the rules.
 """
 
 from __future__ import annotations
@@ -33,8 +33,14 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.cylinder import Cylinder
-from katana450.maths.water.flow import VesselWater, Water
-from katana450.maths.water.lip import THINNING_TIME, viscous_flow, weir_flow, withdrawn_thickness
+from katana450.maths.water.flow import (
+    THINNING_TIME,
+    VesselWater,
+    Water,
+    viscous_flow,
+    weir_flow,
+    withdrawn_thickness,
+)
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY, MILLILITRE, ML, counted
 
 HALVINGS = 40

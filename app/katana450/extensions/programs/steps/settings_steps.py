@@ -10,7 +10,7 @@ import numpy as np
 from katana450 import tolerances
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.commands import MIN_SPEED
-from katana450.arm.control.objects.support import check_carried
+from katana450.arm.control.objects.loose_objects import check_carried
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.free_place import girth

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.session.silence import SilenceProfile
+from katana450.arm.control.session.stopping import SilenceProfile
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.robot.robot import Robot

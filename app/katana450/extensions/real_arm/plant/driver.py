@@ -7,11 +7,10 @@ from collections import deque
 
 import numpy as np
 
-from katana450.arm.control.session.silence import SilenceProfile
+from katana450.arm.control.session.stopping import SilenceProfile
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode, ArmReport, MeasuredStop
 from katana450.arm.drivers.driver import DriverAnswer
-from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.weight import loads_of
+from katana450.arm.robot.robot import Robot, loads_of
 from katana450.errors import InputError
 from katana450.extensions.real_arm.plant.axis import STEP, PlantAxis, PlantProfile
 from katana450.extensions.real_arm.tool_travel import tool_travel

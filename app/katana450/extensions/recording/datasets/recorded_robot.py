@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.robot.bare import bare
-from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.robot import Robot, bare
 from katana450.assembly.robot_files import read_robot
 from katana450.assembly.robot_session import find_arm
 from katana450.errors import InputError

@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from katana450.arm.control.actor import Actor, CommandChannel
+from katana450.arm.control.lease import Actor, CommandChannel
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import EpisodeGiver
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, KeptEpisode

@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from katana450.arm.control.state.event_log import entries_between
+from katana450.arm.control.state.findings import entries_between
 from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.episodes.episode import EpisodeMessage

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from katana450.arm.control.actor import CommandChannel
-from katana450.arm.control.state.following import Following
+from katana450.arm.control.lease import CommandChannel
+from katana450.arm.control.state.modes import Following
 from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
 

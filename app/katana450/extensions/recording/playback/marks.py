@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.extensions.recording.files.recording_file import Message

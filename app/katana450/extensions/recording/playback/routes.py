@@ -17,7 +17,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.lease import CommandChannel
 from katana450.errors import InputError
 from katana450.extensions.recording.messages import StateRow
 from katana450.extensions.recording.playback.drawing import CONTEXTS, PlaybackWindows

@@ -19,8 +19,7 @@ from katana450.extensions.recording.messages import (
 )
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import VesselWater, Water
-from katana450.maths.water.motion import MotionWithWater
+from katana450.maths.water.flow import MotionWithWater, VesselWater, Water
 from katana450.maths.water.parcel import Parcel, Puddle, landing
 from katana450.maths.water.slosh import Slosh
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE

@@ -1,7 +1,8 @@
 """The conduit that carries the arm's cables from link to link, as curves between its fittings.
 
 Each stretch hangs between two links with one joint between them. It is a cubic curve, straight
-where it leaves a fitting, so its shape depends on the angle of that joint alone.
+where it leaves a fitting, so its shape depends on the angle of that joint alone. In the scene it is
+drawn as rings along its curves, instances of one mesh.
 """
 
 from __future__ import annotations
@@ -12,12 +13,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.link import Joint
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
+from katana450.server.view.layer import LayerContext, ViewLayer
+from katana450.server.view.scene import Colour
+from katana450.server.viser_bridge.posing import arrange
 
 CONDUITS = "conduits.json"
 """File beside the URDF that describes where the conduit is held."""
@@ -171,18 +177,11 @@ def _stretch(robot: Robot, element: Any) -> ConduitStretch:
         raise ValueError(f"the radius {radius} m is not between 0 and the length {length} m")
     arm, links = robot.require_arm(), {link.name: link for link in robot.links}
     path = robot.path_to(links[end.link])
-    names = [link.name for link in path]
-    if start.link not in names:
-        raise KeyError(f"{end.link} is not a descendant of {start.link}")
-    between = path[names.index(start.link) + 1 :]
-    driven = [
+    between = path[path.index(links[start.link]) + 1 :]
+    (driven,) = (
         link for link in between if link.joint is not None and link.joint.name in arm.chain.names
-    ]
-    if len(driven) != 1:
-        raise KeyError(
-            f"there are {len(driven)} driven joints between {start.link} and {end.link}, not one"
-        )
-    joint, rest = driven[0].joint, robot.frames(arm.resting)
+    )
+    joint, rest = driven.joint, robot.frames(arm.resting)
     assert joint is not None
     return ConduitStretch(
         start,
@@ -190,7 +189,93 @@ def _stretch(robot: Robot, element: Any) -> ConduitStretch:
         radius,
         length,
         joint,
-        T_start_joint=se3.inverse(rest[start.link]) @ rest[driven[0].name],
-        T_joint_end=se3.inverse(rest[driven[0].name]) @ rest[end.link],
+        T_start_joint=se3.inverse(rest[start.link]) @ rest[driven.name],
+        T_joint_end=se3.inverse(rest[driven.name]) @ rest[end.link],
         winds=element["winds"] == joint.name,
     )
+
+
+Floats = npt.NDArray[np.float32]
+
+RUBBER: Colour = (4, 4, 5)
+"""Linear colour, not sRGB as elsewhere: viser expects linear colours for instances."""
+
+PITCH = 4.2e-3
+"""Distance [m] between two ribs."""
+
+PROFILE = ((-0.62, 0.84), (-0.3, 0.92), (0.0, 1.0), (0.3, 0.92), (0.62, 0.84))
+"""Cross section of a ring as (along, out), fractions of pitch and radius.
+
+Neighbouring rings overlap, so that no gap opens in a bend.
+"""
+
+SIDES = 14
+"""Corners of a ring."""
+
+ANGLE_WORTH_SENDING = 2e-3
+"""Smallest change [rad] that is sent. It moves a rib by less than a third of a millimetre."""
+
+
+class ConduitLayer(ViewLayer):
+    """The conduit as a layer of the scene. Each stretch is a child of the link it starts from."""
+
+    def attach(self, context: LayerContext) -> None:
+        """Add the rings. Raises RobotDescriptionError for an invalid description of the conduit."""
+        self._robot = context.robot
+        self._stretches = stretches_of(context.robot)
+        self._angles = [0.0] * len(self._stretches)
+        self._nodes = []
+        for number, stretch in enumerate(self._stretches):
+            rings = poses(stretch, 0.0)
+            node = context.server.scene.add_batched_meshes_simple(
+                f"{context.arm.path[stretch.start.link]}/conduit{number}",
+                *ring(stretch.radius),
+                rings[:, :4],
+                rings[:, 4:],
+                batched_colors=RUBBER,
+                lod="off",
+            )
+            self._nodes.append(node)
+
+    def follow(self, state: State) -> None:
+        """Bend the conduit as the joints of ``state`` do. Only changed stretches are sent."""
+        angles = self._robot.joint_values(state.q, state.gripper)
+        for number, stretch in enumerate(self._stretches):
+            angle = angles[stretch.joint.name]
+            if abs(angle - self._angles[number]) > ANGLE_WORTH_SENDING:
+                self._angles[number] = angle
+                rings = poses(stretch, angle)
+                arrange(self._nodes[number], rings[:, :4], rings[:, 4:])
+
+
+def poses(stretch: ConduitStretch, angle: float) -> Floats:
+    """Return the poses (n, 7) of the rings at the ``angle`` [rad]: wxyz and position [m].
+
+    A ring looks the same however it is turned about the conduit.
+    """
+    points, tangents = stretch.course(angle, round(stretch.length / PITCH))
+    # The shortest turn of the x axis to each tangent; to the opposite one half a turn about z.
+    wxyz = np.zeros((len(tangents), 4))
+    wxyz[:, 0], wxyz[:, 2:] = 1.0 + tangents[:, 0], tangents[:, :0:-1] * (-1.0, 1.0)
+    wxyz[wxyz[:, 0] < BACKWARD] = (0.0, 0.0, 0.0, 1.0)
+    wxyz /= np.linalg.norm(wxyz, axis=1, keepdims=True)
+    return np.concatenate((wxyz, points), axis=1, dtype=np.float32)
+
+
+BACKWARD = 1e-9
+"""Bound of 1 + cos(angle) below which two unit vectors count as opposite."""
+
+
+def ring(radius: float) -> tuple[FloatArray, npt.NDArray[Any]]:
+    """Return vertices (n, 3) [m] and faces (m, 3) of a rib about the x axis."""
+    turn = np.arange(SIDES) * (math.tau / SIDES)
+    circle = np.stack((np.zeros(SIDES), np.cos(turn), np.sin(turn)), axis=1)
+    rows = [np.array([along * PITCH, 0.0, 0.0]) + out * radius * circle for along, out in PROFILE]
+    first = np.arange(SIDES)
+    second = (first + 1) % SIDES
+    faces = []
+    for row in range(len(PROFILE) - 1):
+        a, b = row * SIDES, (row + 1) * SIDES
+        faces.append(np.stack((a + first, a + second, b + second), axis=1))
+        faces.append(np.stack((a + first, b + second, b + first), axis=1))
+    return np.concatenate(rows), np.concatenate(faces)
