@@ -1,4 +1,4 @@
-"""What a session drives: an arm with its tools and gripper, or the joints of another mechanism."""
+"""The arm that a session drives, with its tools and gripper, or the joints of a mechanism."""
 
 from __future__ import annotations
 

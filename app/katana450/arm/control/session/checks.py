@@ -1,4 +1,4 @@
-"""Whether a command takes effect: checks against the robot, refusals in a state, outcomes."""
+"""Checks of commands against the robot, their refusals in a state, and their outcomes."""
 
 from __future__ import annotations
 
