@@ -37,8 +37,8 @@ def test_a_knob_turns_a_joint_and_the_plots_follow(page: ViserPage, truth: Truth
     assert goal(page, "axis-1") == start
     assert truth.status()["goal"][0] == pytest.approx(math.radians(start), abs=1e-9)
 
-    page.page.locator("#speed input").fill("30")
-    truth.wait(speed=0.3)
+    page.page.locator("#speed input").fill("15")
+    truth.wait(speed=0.15)
     turn(page, "axis-1", 50.0)
     page.wait_until(lambda: legend(page, "joint-speeds")[0] > 1.0, "the speed in its plot")
     # The last command of a turn follows those before it at the rate of the page.

@@ -21,6 +21,7 @@ from katana450.extensions.real_arm.link import ArmUrl
 from tests.real_arm.control_loop import SmallLoop, swing
 from tests.real_arm.paper_arm import ENDS, JOINTS, PaperArm
 from tests.real_arm.small_firmware import Piece, SmallFirmware
+from tests.waiting import until
 
 
 class PaperServer:
@@ -77,7 +78,7 @@ def test_loss_is_reported_in_half_a_second_and_nothing_is_repeated(fault: str) -
         time.sleep(1.0)
         paper.faults = [pieces[fault]]
         assert loop.wait(ArmMode.LOST) < 0.5
-        assert "Trying to connect again" in loop.report.note
+        until(lambda: "Trying to connect again" in loop.report.note)
         sent = orders(paper.arm)
         loop.wait(ArmMode.UNCALIBRATED)
         assert "Connected again" in loop.report.note

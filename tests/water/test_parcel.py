@@ -57,7 +57,8 @@ def test_landing_agrees_with_small_steps(
             ground = Ground.TABLE if min(edges) >= 0.0 else None
         elif z <= table.floor:
             ground = Ground.FLOOR
-    if abs(off) > 1e-3:
+    # A parcel that meets the rim lands on both sides.
+    if abs(off) > max(1e-3, parcel.radius_at(t)):
         assert end.ground is ground
         assert end.age == pytest.approx(t, abs=2e-4)
         assert end.point == pytest.approx((x, y, z), abs=2e-3)
