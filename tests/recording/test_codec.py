@@ -40,7 +40,12 @@ from katana450.extensions.programs.planning.curves import (
 )
 from katana450.extensions.recording.codec import Codec, form_of, key_of, recorded_classes
 from katana450.extensions.recording.former_forms import target_content
-from katana450.extensions.recording.forms import FormError, json_form, json_text
+from katana450.extensions.recording.forms import (
+    MAX_TEXT_BYTES,
+    FormError,
+    json_form,
+    json_text,
+)
 from katana450.extensions.recording.ticks import Digester
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
@@ -431,10 +436,12 @@ def test_wrong_command_of_an_older_version_is_refused(form: dict[str, Any]) -> N
         Codec().decoded(cmd.Command, form)
 
 
-def test_deep_batches_are_refused() -> None:
+def test_deep_batches_and_long_texts_are_refused() -> None:
     text = b'{"is": "batch","commands":[' * 400 + b"]}" * 400
     with pytest.raises(FormError, match="too often"):
         Codec().decoded(cmd.Command, json_form(text))
+    with pytest.raises(FormError, match=f"bytes, more than {MAX_TEXT_BYTES}"):
+        json_form(b" " * (MAX_TEXT_BYTES + 1))
 
 
 def test_every_class_that_is_recorded_is_frozen() -> None:

@@ -34,7 +34,7 @@ from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import session_for, verify_recording
 from katana450.extensions.recording.live import ring as ring_module
-from katana450.extensions.recording.messages import EPISODES, STATE
+from katana450.extensions.recording.messages import COMMANDS, EPISODES, STATE
 from katana450.server.api.episode_requests import episode_request
 from tests.recording.episode_bench import ADA, Bench, motion
 from tests.recording.recorded import header
@@ -289,6 +289,10 @@ def test_episode_states_what_the_disk_did_not_take(
     bench.keeper.tick()
     assert bench.keeper.status()["last"]["missing_ticks"] == 101
     assert bench.folder.find(1).episode.missing_ticks == 101
+    with RecordingFile.open(bench.folder.path(1)) as file:
+        ticks = [tick for tick in file.messages(COMMANDS) if b'"missing"' not in tick.data]
+    # What the failed sync had given to the file is not there too.
+    assert ticks[-1].t == pytest.approx(motion()[59].t)
     assert main(["record", "list", str(bench.folder.folder)]) == 0
     assert "(101 ticks of 10 ms are missing)" in capsys.readouterr().out
 
