@@ -37,15 +37,19 @@ def test_a_knob_turns_a_joint_and_the_plots_follow(page: ViserPage, truth: Truth
     assert goal(page, "axis-1") == start
     assert truth.status()["goal"][0] == pytest.approx(math.radians(start), abs=1e-9)
 
-    page.page.locator("#speed input").fill("15")
-    truth.wait(speed=0.15)
+    page.page.locator("#speed input").fill("20")
+    truth.wait(speed=0.2)
     turn(page, "axis-1", 50.0)
     page.wait_until(lambda: legend(page, "joint-speeds")[0] > 1.0, "the speed in its plot")
     # The last command of a turn follows those before it at the rate of the page.
-    page.wait_until(lambda: abs(goal(page, "axis-1") - start - 50.0) < 2.0, "the goal")
+    page.wait_until(
+        lambda: abs(goal(page, "axis-1") - start - 50.0) < 2.0, "the goal", seconds=20.0
+    )
     reached = goal(page, "axis-1")
     end = math.radians(reached)
-    page.wait_until(lambda: abs(truth.status()["q"][0] - end) < 1e-4, "the end of the turn")
+    page.wait_until(
+        lambda: abs(truth.status()["q"][0] - end) < 1e-4, "the end of the turn", seconds=20.0
+    )
     page.wait_until(
         lambda: legend(page, "joint-angles")[0] == pytest.approx(reached, abs=0.06), "the end"
     )
