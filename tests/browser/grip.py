@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from tests.browser.page import Pixel, ViserPage
+    from tests.browser.page import Axis, Pixel, ViserPage
 
 Array = NDArray[np.floating[Any]]
 
@@ -18,19 +18,24 @@ Array = NDArray[np.floating[Any]]
 class Grip(ABC):
     """A context manager that presses the mouse on a handle and releases it at the end.
 
-    `hit` (3,) is where the press meets the handle and `matrix` (4,4) the handle's pose, both in
-    three.js's world. Raises AssertionError if the press does not start a drag.
+    Raises AssertionError if two presses do not start a drag.
     """
 
-    def __init__(self, page: ViserPage, node: str, pixel: Pixel, hit: Array, matrix: Array) -> None:
+    KIND: ClassVar[str]
+
+    def __init__(self, page: ViserPage, node: str, axis: Axis) -> None:
         self._page = page
         self._mouse = page.page.mouse
         self._node = node
-        self._pixel = pixel
-        self._hit = hit
+        self._axis = axis
+        self._value = 0.0
+        self._locate()
+
+    def _locate(self) -> None:
+        """Find where the press meets the handle, and the handle's pose, in three.js's world."""
+        self._pixel, self._hit, matrix = self._page.handle(self._node, self.KIND, self._axis)
         self._origin = matrix[:3, 3]
         self._axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
-        self._value = 0.0
 
     @abstractmethod
     def _point_at(self, value: float) -> Array:
@@ -51,6 +56,15 @@ class Grip(ABC):
             self.to(float(step))
 
     def __enter__(self) -> Self:
+        try:
+            self._press()
+        except AssertionError:
+            # The scene has moved between the look and the press. A person tries again.
+            self._locate()
+            self._press()
+        return self
+
+    def _press(self) -> None:
         started = self._count("Start")
         self._mouse.move(*self._pixel)
         self._mouse.down()
@@ -61,7 +75,6 @@ class Grip(ABC):
         except BaseException:
             self._mouse.up()
             raise
-        return self
 
     def __exit__(self, _kind: object, error: object, _trace: object) -> None:
         ended = self._count("End")
@@ -81,6 +94,8 @@ class Grip(ABC):
 class ArrowGrip(Grip):
     """A grip on an arrow, which lies along y of its own frame; values are in metres."""
 
+    KIND = "arrow"
+
     def _point_at(self, value: float) -> Array:
         # drei moves the control by the point of this line that is nearest to the mouse's ray.
         point: Array = self._hit + value * self._axes[:, 1]
@@ -89,6 +104,8 @@ class ArrowGrip(Grip):
 
 class RingGrip(Grip):
     """A grip on a ring in the x-y plane of its own frame; values are radians about z."""
+
+    KIND = "ring"
 
     def _point_at(self, value: float) -> Array:
         # drei measures the angle in the ring's plane from the pressed point.

@@ -266,15 +266,19 @@ class ViserPage:
 
     def grip_arrow(self, node: str, axis: Axis) -> Grip:
         """Return a grip on the arrow along a control's own axis; values are in metres."""
-        spot = self.frame.evaluate("(which) => harness.grip(...which)", [node, "arrow", axis])
-        matrix, hit = _matrix(spot["matrix"]), np.array(spot["hit"])
-        return ArrowGrip(self, node, self._in_window(spot["pixel"]), hit, matrix)
+        return ArrowGrip(self, node, axis)
 
     def grip_ring(self, node: str, axis: Axis) -> Grip:
         """Return a grip on the ring about a control's own axis; values are in radians."""
-        spot = self.frame.evaluate("(which) => harness.grip(...which)", [node, "ring", axis])
-        matrix, hit = _matrix(spot["matrix"]), np.array(spot["hit"])
-        return RingGrip(self, node, self._in_window(spot["pixel"]), hit, matrix)
+        return RingGrip(self, node, axis)
+
+    def handle(self, node: str, kind: str, axis: Axis) -> tuple[Pixel, Matrix, Matrix]:
+        """Return where a press meets an arrow or ring, in pixels and (3,), and its pose (4, 4).
+
+        Point and pose are in three.js's world.
+        """
+        spot = self.frame.evaluate("(which) => harness.grip(...which)", [node, kind, axis])
+        return self._in_window(spot["pixel"]), np.array(spot["hit"]), _matrix(spot["matrix"])
 
     def drag_arrow(self, node: str, axis: Axis, metres: float, *, steps: int = DRAG_STEPS) -> None:
         """Drag a control along one of its own axes and release it."""
