@@ -31,8 +31,8 @@ APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 
 # Below the ports of outgoing connections, so that none of those takes the port of a killed server.
-# Even, because the next port serves STOP.
-PORTS = range(8200, 8300, 2)
+# Even, because the next port serves STOP. Many, so that two tests never choose the same at once.
+PORTS = range(20000, 30000, 2)
 READY = re.compile(r"is ready: (https?://\S+)")
 STOP_PORT = re.compile(r"STOP also on port (\d+)")
 KEPT_LINES = 400
