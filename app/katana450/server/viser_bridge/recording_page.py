@@ -1,4 +1,4 @@
-"""The page that viser makes for a recording, changed to say what it shows."""
+"""The page that viser makes for a recording, changed to say what it shows and to play on."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ PLAYER = """<script>{
   const append = document.head.appendChild;
   const replaced = [
     [/[\\w$]+\\.useEnvironment\\.set\\([\\w$]+\\(\\)\\)/, 'void 0'],
+    [/(\\.currentTime=([\\w$]+),[\\w$]+\\(\\2\\)),[\\w$]+\\(!0\\)/, '$1'],
     [/(size:`md`,variant:`subtle`,)(onClick:\\(\\)=>[\\w$]+\\(!([\\w$]+)\\))/,
      '$1"aria-label":$3?`Play`:`Pause`,$2'],
   ];
@@ -36,7 +37,23 @@ PLAYER = """<script>{
 
 1. The player sets its own environment map before it plays the messages from the start, also to seek
    backwards. Our map is then decoded again, and the scene is nearly black until that is done.
-2. The button that plays and pauses has no name for screen readers.
+2. Seeking pauses it without a word. Now it plays on from there.
+3. The button that plays and pauses has no name for screen readers.
+"""
+
+NARROW = """<script>{
+  const FITS = 1.2;
+  const timer = setInterval(() => {
+    const { camera, cameraControl, canvas, nodeRefFromName } = window.__viserMutable ?? {};
+    if (!cameraControl || !canvas.clientHeight || !nodeRefFromName['/arm']) return;
+    clearInterval(timer);
+    const aspect = canvas.clientWidth / canvas.clientHeight;
+    if (aspect < FITS) cameraControl.dollyTo((cameraControl.distance * FITS) / aspect, false);
+  }, 50);
+}</script>"""
+"""Script that looks from farther away in a picture that is narrower than FITS times its height.
+
+The field of view is a vertical angle, so such a picture would cut the robot off at its sides.
 """
 
 CAPTION = """<style>#caption {{ position: fixed; left: 1em; bottom: 4em; z-index: 2; margin: 0;
@@ -61,4 +78,4 @@ def titled(page: str, title: str, caption: str) -> str:
             f"viser's page must contain {TITLE} once: install the pinned version of viser."
         )
     shown = CAPTION.format(text=json.dumps(caption).replace("<", "\\u003c"))
-    return page.replace(TITLE, f"<title>{html.escape(title)}</title>{CLEAR}{PLAYER}{shown}")
+    return page.replace(TITLE, f"<title>{html.escape(title)}</title>{CLEAR}{PLAYER}{NARROW}{shown}")
