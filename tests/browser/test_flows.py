@@ -64,8 +64,8 @@ def first_visit(person: Person) -> None:
 
 def motion(person: Person) -> None:
     page, truth = person.page, person.truth
-    page.page.locator("#speed input").fill("10")
-    truth.wait(speed=0.1)
+    page.page.locator("#speed input").fill("5")
+    truth.wait(speed=0.05)
     person.open_panel()
     person.keep("drive")
     person.press(page.frame.get_by_role("button", name="Home", exact=True))

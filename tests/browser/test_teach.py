@@ -214,12 +214,6 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
     press(sheet, "Poses")
     sheet.wait_until(lambda: "no poses" in says(sheet), "the refusal")
     assert area.is_visible()
-    # A mistake in an attached file is named by that file, and marks no line of the script.
-    area.fill('scene: {"a.yaml": "# A file.\\nobjects: []"}\nsteps:\n  - home\n')
-    sheet.wait_until(
-        lambda: page.inner_text("#teach-problems").startswith("a.yaml, line 2 "), "the file"
-    )
-    assert page.locator("#teach-editor pre .bad").count() == 0
 
 
 @pytest.mark.long
