@@ -36,7 +36,7 @@ TARGETS = ((0.33, 0.05, 0.08), (0.28, -0.04, 0.03), (0.3, 0.0, 0.06))
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AppServer]:
     folder = tmp_path_factory.mktemp("ring")
-    with AppServer((*RECORDING_APP, "--record", str(folder))) as running:
+    with AppServer((*RECORDING_APP, "--silence", "2.0", "--record", str(folder))) as running:
         yield running
 
 
