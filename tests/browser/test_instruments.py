@@ -37,8 +37,8 @@ def test_a_knob_turns_a_joint_and_the_plots_follow(page: ViserPage, truth: Truth
     assert goal(page, "axis-1") == start
     assert truth.status()["goal"][0] == pytest.approx(math.radians(start), abs=1e-9)
 
-    page.page.locator("#speed input").fill("20")
-    truth.wait(speed=0.2)
+    page.page.locator("#speed input").fill("30")
+    truth.wait(speed=0.3)
     turn(page, "axis-1", 50.0)
     # The last command of a turn follows those before it at the rate of the page.
     page.wait_until(
