@@ -131,7 +131,7 @@ def test_length_beyond_the_file_reserves_no_memory(path: Path, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        (b"", "is not a recording, or is damaged: it ends 8 bytes too soon"),
+        (b"", "is empty: nothing was recorded"),
         (b"PK\x03\x04" * 100, "is not a recording: it does not begin as MCAP files do"),
         (MAGIC + bytes(100), "is not a recording, or is damaged"),
         (bomb(TEN).replace(b"katana450", b"kathana45"), "but no recording"),

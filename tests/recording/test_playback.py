@@ -396,3 +396,16 @@ def test_any_moment_of_an_hour_has_its_state(tmp_path: Path) -> None:
         assert state is not None
         # It is the last state before. The arm of this recording pauses for up to 1.4 s.
         assert -1e-3 < after - (state.row.t - first.row.t) < 1.5
+
+
+def test_file_that_the_recorder_has_just_created_is_no_fault(tmp_path: Path) -> None:
+    path = tmp_path / "1.mcap"
+    path.touch()
+    run = PlaybackRun(lambda: [path])
+    run.update()
+    assert run.spans == ()
+    with pytest.raises(InputError, match="is empty"), RecordingFile.open(path):
+        pass
+    path.write_bytes(b"abc")
+    with pytest.raises(InputError, match="too soon"):
+        run.update()

@@ -264,10 +264,12 @@ class RecordingFile:
         self._attachments: list[int] = []
         self._next, self._count = MAGIC_BYTES, 0
         with self._reading() as stream:
-            # This checks the magic number.
-            next(records_at(stream, 0))
+            self.size = stream.size
+            # The recorder has just created a file that is empty. The others have a magic number.
+            if self.size:
+                next(records_at(stream, 0))
         self.update()
-        if not self.metadata:
+        if self.size and not self.metadata:
             raise InputError(f"{path} is an MCAP file, but no recording of katana450.")
 
     @classmethod
@@ -280,6 +282,8 @@ class RecordingFile:
             raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
         with file:
             recording = cls(path, file)
+            if not recording.size:
+                raise InputError(f"{path} is empty: nothing was recorded.")
             recording._check_newest()
             yield recording
 
