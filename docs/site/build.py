@@ -44,7 +44,6 @@ REFERENCE = {
     "Plans": ("MotionPlan", "Trajectory", "Viewer"),
     "Reachability": ("ReachabilityMap",),
     "Recordings": ("open", "Recording"),
-    "Scripts": ("program", "ScriptWriter"),
     "Client": ("connect", "Client"),
     "Errors": (
         "KatanaError",
