@@ -21,13 +21,14 @@ from katana450.assembly.robot_session import find_robot
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.export.playback import load_motion
-from katana450.extensions.recording.files.header import header_of
+from katana450.extensions.recording.files.header import fingerprint, header_of
+from katana450.extensions.recording.files.record_command import same_setpoints
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.messages import CHECKPOINTS, COMMANDS
-from katana450.extensions.recording.ticks import Digester, Verification
+from katana450.extensions.recording.ticks import Difference, Digester, Verification
 from katana450.settings import Settings
 from tests.conftest import LONG
 from tests.recording.dataset_files import write_copy
@@ -244,10 +245,27 @@ def test_command_describes_cuts_and_explains(
     for metadata, words in (
         ({}, "so the recording was changed"),
         ({"cpu": "Another processor"}, "cpu: Another processor there"),
-        ({"format": "1"}, "format: 1 there, 2 here"),
     ):
         write_copy(part, foreign, metadata=metadata, change=change)
         assert main(["record", "verify", str(foreign)]) == 1
         output = capsys.readouterr().out
         assert "first difference at t = " in output
         assert words in output
+
+
+@pytest.mark.parametrize(
+    ("distances", "size", "same"),
+    [(None, 0.0, True), ("coal", 5e-10, True), (None, 1e-8, False), ("", 0.0, False)],
+    ids=["none named", "another library", "setpoints differ", "the same library"],
+)
+def test_recordings_of_another_distance_library_pass_by_their_setpoints(
+    distances: str | None, size: float, same: bool
+) -> None:
+    recorded = fingerprint()
+    if distances is None:
+        del recorded["distances"]
+    elif distances:
+        recorded["distances"] = distances
+    first = Difference(1.0, size)
+    assert same_setpoints(Verification(9, 2, first, first), recorded) is same
+    assert not same_setpoints(Verification(9), recorded)

@@ -26,7 +26,7 @@ from katana450.arm.control.lease import Actor
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.stopping import with_name
 from katana450.arm.control.state.arm_report import ArmReport
-from katana450.arm.control.state.modes import Following, Leaving, Mode
+from katana450.arm.control.state.modes import Following, Leaving, Mode, Positioning, Tracking
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
 from katana450.arm.control.state.stop_cause import StopCause
@@ -34,6 +34,7 @@ from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.recording.codec import Codec
+from katana450.extensions.recording.former_forms import poured_content, target_content
 from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.messages import GivenCommand, SentAnswer, TickMessage
 from katana450.maths.geometry.arrays import FloatArray
@@ -42,8 +43,9 @@ DIGEST_DIGITS = 10
 """Length of a digest. One of 10^10 states that differ has the same digest by chance. Decimal digits
 take less room than others beside numbers."""
 
-APART = ("t", "mode", "objects")
+APART = ("t", "mode", "objects", "bodies")
 PLAIN = tuple(field.name for field in fields(State) if field.name not in APART)
+POURED = PLAIN.index("poured")
 
 
 def _hook(value: Any) -> Any:
@@ -79,7 +81,11 @@ class Digester:
             self._objects = state.objects
             self._of_objects = hashlib.blake2b(self._encoder.encode(state.objects)).digest()
         values = [getattr(state, name) for name in PLAIN]
-        return self._encoder.encode((values, self._of_objects, _mode(state.mode)))
+        values[POURED] = poured_content(state.poured)
+        content = values, self._of_objects, _mode(state.mode)
+        # Older versions have none.
+        bodies = () if state.bodies is None else (state.bodies,)
+        return self._encoder.encode((*content, *bodies))
 
     def digest(self, state: State, content: bytes | None = None) -> str:
         """Return the digest of ``state``. ``content``: its content, if it is known."""
@@ -92,9 +98,16 @@ def _mode(mode: Mode) -> tuple[Any, ...]:
     name = type(mode).__name__
     match mode:
         case Following(plan=plan):
-            return name, plan.span, mode.number, mode.pace
+            # Older versions could go back on a plan, to any place of it.
+            return name, plan.span, mode.number, mode.pace, plan.span
         case Leaving(along=along, then=then):
             return name, _mode(along), _mode(then)
+        case Positioning(target=target, beyond_gap=beyond):
+            # Older versions had a detour there.
+            return name, *target_content(target), beyond, None
+        case Tracking():
+            target, since = target_content(mode.target)[1], target_content(mode.since)[1]
+            return name, {"target": target, "since": since, "let_go": mode.let_go}
     return name, mode
 
 

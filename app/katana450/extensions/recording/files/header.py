@@ -28,10 +28,10 @@ from katana450.cli.version import version
 from katana450.portable_rounding import ROUNDS_PORTABLY
 from katana450.settings import Settings
 
-FORMAT: Final = "2"
-"""Version of the format of recordings. Those of another one are read as far as they can be."""
+DISTANCES = "distances"
+"""Entry that tells what measured the distances of bodies. Recordings by coal or FCL have none."""
 
-RELEVANT = ("format", "version", "python", "numpy", "distances", "blas", "libc", "machine", "cpu")
+RELEVANT = ("version", "python", "numpy", DISTANCES, "blas", "libc", "machine", "cpu")
 """Entries that show why a simulation may not give the same bits."""
 
 ROUNDING, PORTABLE = "rounding", "portable"
@@ -43,11 +43,10 @@ UNKNOWN = "unknown"
 def fingerprint() -> dict[str, str]:
     """Return the versions of program and libraries, and the kind of the processor."""
     return {
-        "format": FORMAT,
         "version": version(),
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "distances": f"MuJoCo {metadata.version('mujoco-core')}",
+        DISTANCES: f"MuJoCo {metadata.version('mujoco-core')}",
         "blas": _blas(),
         "libc": " ".join(platform.libc_ver()).strip() or UNKNOWN,
         "machine": f"{sys.platform} {platform.machine()}",
@@ -85,6 +84,9 @@ def _cpu() -> str:
 
 METADATA: Final = "katana450"
 """Name of the metadata record."""
+
+FORMAT: Final = "1"
+"""Version of the format of recordings."""
 
 URDF_MEDIA_TYPE = "application/xml"
 
@@ -154,6 +156,7 @@ def header_of(
     described = bytes_of(urdf)
     used = RecordedSettings(tuple(settings.ready), settings.bare, settings.rate, tool)
     metadata = {
+        "format": FORMAT,
         "robot": robot.name,
         "urdf": urdf.name,
         "urdf_sha256": hashlib.sha256(described).hexdigest(),

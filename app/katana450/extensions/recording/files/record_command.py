@@ -6,6 +6,7 @@ import json
 import math
 import sys
 from argparse import Namespace
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,12 +18,17 @@ from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.export_command import check_options, export
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episodes_in
-from katana450.extensions.recording.files.header import differences
+from katana450.extensions.recording.files.header import (
+    DISTANCES,
+    differences,
+    fingerprint,
+)
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.simulation import verified
 from katana450.extensions.recording.files.trimming import keep, trim
 from katana450.extensions.recording.folders import recordings_in
+from katana450.extensions.recording.ticks import Verification
 
 PROGRESS_STEP = 0.02
 """[1] Fraction of a recording after which the progress is shown again."""
@@ -32,6 +38,14 @@ MB = 1e6
 SAME_PROGRAM = (
     "Program, libraries and processor are the same, so the recording was changed, or the process "
     "that made it rounded otherwise."
+)
+
+SAME = 1e-9
+"""[rad or m] Difference of a setpoint that the rounding of distances can make."""
+
+OTHER_DISTANCES = (
+    "All setpoints are the same. Distances between bodies were measured by another library, and "
+    "differ in their rounding."
 )
 
 
@@ -115,6 +129,9 @@ def _verify(path: Path, urdf: Path | None, *, as_json: bool) -> int:
             raise InputError(f"{path} has no tick that can be simulated.")
         if result.identical:
             return 0
+        if same_setpoints(result, file.metadata):
+            print(OTHER_DISTANCES)
+            return 0
         others = differences(file.metadata)
         if others:
             print("It was made by another program or machine, whose rounding can differ:")
@@ -123,6 +140,16 @@ def _verify(path: Path, urdf: Path | None, *, as_json: bool) -> int:
         else:
             print(SAME_PROGRAM)
     return 1
+
+
+def same_setpoints(result: Verification, recorded: Mapping[str, str]) -> bool:
+    """Return whether only distances differ, because another library measured them.
+
+    ``recorded``: the fingerprint of the recording.
+    """
+    if result.largest is None or recorded.get(DISTANCES) == fingerprint()[DISTANCES]:
+        return False
+    return result.largest.size <= SAME
 
 
 def _verify_for_programs(path: Path, urdf: Path | None) -> int:

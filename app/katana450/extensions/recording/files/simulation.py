@@ -106,9 +106,7 @@ def _placed(message: Message) -> Iterator[None]:
         yield
     except (FormError, msgspec.MsgspecError, RecursionError, UnicodeError) as error:
         place = f"the message of {message.topic} at t = {message.t:.3f} s"
-        raise InputError(
-            f"The recording is damaged or of another version, in {place}: {error}."
-        ) from error
+        raise InputError(f"The recording is damaged in {place}: {error}.") from error
 
 
 def verify_recording(

@@ -1,0 +1,147 @@
+"""Forms of older versions, which recorded only the cup, with a liquid of several.
+
+They named commands by the classes of their time, which counted axes from 0. Their files are read,
+and the digests of their states are still made, so that they verify.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from katana450.arm.control.commands.act import tag_of
+from katana450.arm.control.objects.pouring import CUP
+from katana450.arm.control.state.modes import Following, Positioning, Target
+from katana450.extensions.recording.forms import FormError, shown
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.water.flow import MotionWithWater
+from katana450.maths.water.units import ML
+
+FORMER: Mapping[str, Any] = {"liquid": ["water", 998.2, 1.0016e-3, 72.74e-3, [74, 148, 192]]}
+"""Fields that are not written any more, each with the only form that is read."""
+
+OF_CUP = ("volume", "T", "slosh", "film", "wetted")
+"""Fields of the cup, which had the names WRITTEN among those of all water."""
+
+WRITTEN = ("cup", "T_base_cup", "slosh", "film", "wetted")
+OF_MOTION = ("course", "middle", "velocity")
+
+
+CLASSES: Mapping[str, str] = {"ToolPose": "ToolTarget", "PoseLines": "ToolLines"}
+"""Present names of classes that had another one."""
+
+COMMANDS: Mapping[str, str] = {
+    **{"SetJoint": "joint", "SetJoints": "joints", "MoveTool": "position", "SetPose": "pose"},
+    **{"TurnTool": "turn", "OrientTool": "orient", "SetGripper": "gripper", "SetTool": "tool"},
+    **{"SpeedScale": "speed", "TakeBranch": "branch"},
+}
+"""Present names of the commands whose former class had another name."""
+
+
+def command_form(form: Mapping[str, Any], detours: list[Any]) -> Mapping[str, Any]:
+    """Return ``form`` of a command as it is written now.
+
+    Older versions offered a detour after a drag, which a command of its own took. ``detours`` has
+    the forms of the plans that were offered so far, the newest last.
+    """
+    former = form.get("is")
+    match form:
+        case {"is": "OfferDetour" | "offer_detour", "plan": plan}:
+            detours.append(plan)
+            return {"is": "batch", "commands": []}
+        case {"is": "Go" | "go"} if detours:
+            return {"is": "follow", "plan": detours[-1], "tau": 0.0}
+        case {"is": "branch", "shoulder": shoulder, "elbow": elbow, "name": name}:
+            return {"is": "branch", "name": name or f"{shoulder}-{elbow}"}
+    if not isinstance(former, str) or not former[:1].isupper():
+        return form
+    now = dict(form) | {"is": COMMANDS.get(former, tag_of(former))}
+    match former, now:
+        case "SetJoint" | "Nudge", {"axis": int(axis)}:
+            now["axis"] = axis + 1
+        case "SetAxes", {"values": list(values)}:
+            now["values"] = [
+                [row[0] + 1, *row[1:]] if _is_axis_value(row) else row for row in values
+            ]
+        case "MoveTool", {"position": _}:
+            now["p"] = now.pop("position")
+        case "TakeBranch", {"branch": {"shoulder": shoulder, "elbow": elbow}}:
+            now["name"] = f"{shoulder}-{elbow}"
+            del now["branch"]
+        case "TakeBranch", {"branch": _}:
+            now["name"] = now.pop("branch")
+        case "Fill", {"volume": int(volume) | float(volume)}:
+            now["ml"] = _millilitres(volume)
+            del now["volume"]
+        case "Servo", {"t": t}:
+            now |= {"is": "servo"} if t is None else {"is": "timed_servo"}
+            if t is None:
+                del now["t"]
+        case "Hold" | "Pause", {"finding": finding}:
+            now["is"] += "" if finding is None else "_for"
+            if finding is None:
+                del now["finding"]
+    return now
+
+
+def _is_axis_value(row: Any) -> bool:
+    return isinstance(row, list) and bool(row) and isinstance(row[0], int)
+
+
+def _millilitres(volume: float) -> float:
+    """Return the number of millilitres of which ``volume`` [m^3] was made, exact to the bit."""
+    ml = volume / ML
+    near = (round(ml, 9), ml, math.nextafter(ml, 0.0), math.nextafter(ml, math.inf))
+    return next((number for number in near if ML * number == volume), ml)
+
+
+def upgraded(kind: type, form: Mapping[str, Any], detours: list[Any]) -> Mapping[str, Any]:
+    """Return ``form`` of a value of ``kind`` as it is written now. Raises FormError.
+
+    detours: see `command_form`.
+    """
+    if kind is ToolTarget and "R" in form:
+        return {"position": form.get("position"), "rotation": form["R"]}
+    if kind is Following:
+        return {name: content for name, content in form.items() if name != "towards"}
+    if kind is Positioning:
+        detours += filter(None, [form.get("detour")])
+        return {name: content for name, content in form.items() if name != "detour"}
+    if kind is not MotionWithWater or "motions" in form:
+        return form
+    whole, water = dict(form), form.get("water")
+    if not isinstance(water, dict):
+        raise FormError(f"{shown(water)} is not the water of a cup")
+    water = dict(water)
+    cup = {now: water.pop(name) for name, now in zip(WRITTEN, OF_CUP, strict=True) if name in water}
+    motion = {name: whole.pop(name) for name in OF_MOTION if name in whole}
+    return whole | {"water": water | {"vessels": [{"name": CUP} | cup]}, "motions": [motion]}
+
+
+def target_content(target: Target) -> tuple[str, Any]:
+    """Return the content of a target for a digest, with the classes of older versions."""
+    if not isinstance(target, ToolTarget):
+        return type(target).__name__, target
+    if target.is_pitched:
+        position, pitch, roll = target.position, target.pitch, target.roll
+        return "ToolTarget", {"position": position, "pitch": pitch, "roll": roll}
+    return "ToolPose", {"position": target.position, "R": target.R}
+
+
+def poured_content(poured: MotionWithWater | None) -> dict[str, Any] | None:
+    """Return the content of the water for a digest, in the order of older versions."""
+    if poured is None:
+        return None
+    water, cup, others = poured.water, poured.water.cup, poured.water.others
+    content = {
+        "water": {
+            "cup": cup.volume,
+            **{name: getattr(water, name) for name in ("basin", "parcels", "puddles")},
+            **{"slosh": cup.slosh, "T_base_cup": cup.T, "film": cup.film, "wetted": cup.wetted},
+            **FORMER,
+        },
+        **vars(poured.motions[0]),
+        "waited": poured.waited,
+    }
+    return content | ({"others": (others, poured.motions[1:])} if others else {})
