@@ -1,4 +1,4 @@
-"""Write ``client/acts.pyi``, the signatures of the methods that are derived from acts.
+"""Write the ``.pyi`` files of the methods that are derived from classes.
 
 Run it with ``python -m docs.stubs``.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -17,6 +18,8 @@ import numpy as np
 import katana450
 from katana450.arm.control.commands.act import Request
 from katana450.client import acts
+from katana450.extensions.programs.language.declaration import Schema
+from katana450.library import step_methods
 from katana450.server.api.episode_requests import EpisodeRequest
 
 PACKAGE = Path(katana450.__file__).parent
@@ -116,9 +119,72 @@ def type_text(hint: Any, named: set[type]) -> str:
     return str(hint.__name__)
 
 
-STUB = PACKAGE / "client" / "acts.pyi"
-"""The file that is written."""
+STEPS_HEAD = """\
+# Written by `python -m docs.stubs` from the classes of the steps.
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy.typing as npt
+
+from katana450.extensions.programs.building.step import Step
+from katana450.extensions.programs.language.declaration import Schema
+
+METHODS: dict[str, type[Step]]
+
+class StepField:
+    name: str
+    schema: Schema
+    parameter: Any
+
+def fields_of(step: type[Step]) -> list[StepField]: ...
+def documentation_of(step: type[Step]) -> str: ...
+def resolved(schema: Schema) -> Schema: ...
+
+class StepMethods:
+    def write(self, step: str, content: Any) -> None: ...
+"""
+
+VALUES = {
+    "string": "str",
+    "number": "float",
+    "array": "Sequence[Any] | npt.NDArray[Any]",
+    "object": "Mapping[str, Any]",
+}
+"""Type of a value of a script by the type in its JSON Schema."""
+
+
+def steps_stub() -> str:
+    """Return the content of ``library/step_methods.pyi``."""
+    methods: list[str] = []
+    for word, step in step_methods.METHODS.items():
+        parameters = ["self"]
+        for field in step_methods.fields_of(step):
+            parameter, text = field.parameter, " | ".join(value_types(field.schema))
+            if parameter.kind is inspect.Parameter.KEYWORD_ONLY and "*" not in parameters:
+                parameters.append("*")
+            is_required = parameter.default is inspect.Parameter.empty
+            text += "" if is_required else " | None = ..."
+            parameters.append(f"{parameter.name}: {text}")
+        methods.append(method_text(word, parameters, "None", step_methods.documentation_of(step)))
+    return STEPS_HEAD + "\n".join(methods)
+
+
+def value_types(schema: Schema) -> list[str]:
+    """Return the types of Python in which a value of ``schema`` can be given, each once."""
+    schema = step_methods.resolved(schema)
+    if "anyOf" in schema and "type" not in schema:
+        options = [text for option in schema["anyOf"] for text in value_types(option)]
+        return [*dict.fromkeys(options)]
+    return [VALUES[schema.get("type", "string")]]
+
+
+STUBS: dict[Path, Callable[[], str]] = {
+    PACKAGE / "client" / "acts.pyi": acts_stub,
+    PACKAGE / "library" / "step_methods.pyi": steps_stub,
+}
+"""Content of each file."""
 
 
 if __name__ == "__main__":
-    STUB.write_text(acts_stub(), encoding="utf-8")
+    for file, content in STUBS.items():
+        file.write_text(content(), encoding="utf-8")

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from katana450.library.motion_plan import Trajectory as Trajectory
     from katana450.library.recording import Recording as Recording
     from katana450.library.recording import open as open
+    from katana450.library.script_writer import ScriptWriter as ScriptWriter
+    from katana450.library.script_writer import program as program
     from katana450.library.solutions import IKSolutions as IKSolutions
     from katana450.library.viewer import Viewer as Viewer
     from katana450.maths.kinematics.branch import Branch as Branch

@@ -44,6 +44,7 @@ REFERENCE = {
     "Plans": ("MotionPlan", "Trajectory", "Viewer"),
     "Reachability": ("ReachabilityMap",),
     "Recordings": ("open", "Recording"),
+    "Scripts": ("program", "ScriptWriter"),
     "Client": ("connect", "Client"),
     "Errors": (
         "KatanaError",

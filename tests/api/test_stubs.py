@@ -1,4 +1,4 @@
-"""The clients have a method for each act, and the stub of these methods is up to date."""
+"""The clients have a method for each act, and the stubs of these methods are up to date."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from docs.stubs import STUB, acts_stub
+from docs.stubs import STUBS
 from katana450.client import AsyncClient, Client
 from katana450.client.acts import METHODS, OWN, Acts
 from katana450.client.files import EpisodeClient
 from katana450.server.api import requests
 
 
-def test_stub_is_up_to_date() -> None:
-    assert STUB.read_text(encoding="utf-8") == acts_stub(), "run `python -m docs.stubs`"
+def test_stubs_are_up_to_date() -> None:
+    for file, content in STUBS.items():
+        assert file.read_text(encoding="utf-8") == content(), "run `python -m docs.stubs`"
 
 
 def test_each_act_has_a_method_that_hides_none_of_the_clients() -> None:

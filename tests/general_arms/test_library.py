@@ -154,6 +154,16 @@ def test_plan_leads_to_a_pose_and_a_line_turns_to_angles(urdf: Urdf) -> None:
         assert viewer.url.startswith("http://127.0.0.1:")
 
 
+def test_script_written_in_python_has_a_yaw() -> None:
+    with katana450.program("Turn", frame="base") as p:
+        p.pose("above", [450, 150, 350], roll=180, pitch=0, yaw=90)
+        p.move("above")
+        p.move([400, 0, 300], yaw=10)
+        p.line(by={"z": -50}, yaw="0.5 rad")
+        p.circle([400, 0, 300], "x", 40, yaw=20)
+    assert str(p).count("yaw:") == 4
+
+
 FAR = np.zeros((4, 4))
 FAR[0, 3] = 3.0
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import pytest
-import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -34,13 +32,6 @@ steps:
         - wait: 0.5
   - circle: {centre: [150, 0, -110], normal: -x, radius: 100, pitch: roomiest}
 """
-
-
-def test_script_in_json_is_that_in_yaml() -> None:
-    script = parse(json.dumps(yaml.safe_load(GOOD), indent=1))
-    assert [repr(placed.step) for placed in script.steps] == [
-        repr(placed.step) for placed in parse(GOOD).steps
-    ]
 
 
 def test_numbers_are_read_in_degrees_and_millimetres() -> None:
