@@ -140,6 +140,7 @@ Viser.interceptMessages({
     if (Viser.hasHidden() && Viser.handles(message)) return false;
     if (Viser.hasHidden() && Viser.controls(message) && choice?.label !== "View") outer?.katana?.live();
     if (choice?.label === "View") Fit.choose(choice.value);
+    if (Viser.phaseOf(message)) outer?.katana?.dragged?.(message);
     return true;
   },
   connected() {

@@ -227,6 +227,9 @@ export const controls = ({ type }) => type === "GuiUpdateMessage";
 /** Whether `message` of the page drags or clicks something in the scene. @param {ViserPage.Message} message */
 export const handles = ({ type }) => /^(TransformControls|SceneNodeClick|SceneNodeDrag|ScenePointer)/.test(type);
 
+/** Return the part of a drag of a handle that `message` of the page is: Start, Update or End; otherwise undefined. @param {ViserPage.Message} message */
+export const phaseOf = ({ type }) => /^TransformControls(?:Drag)?(Start|Update|End)/.exec(type)?.[1];
+
 /** Return the server's last messages that place and turn the camera; each may be missing. @param {ViserPage.Message[]} messages */
 export const viewsIn = (messages) =>
   ["SetCameraPositionMessage", "SetCameraLookAtMessage"].map((type) =>

@@ -5,7 +5,7 @@ import { button, html, signed } from "../instruments/shape.js";
 import { readState } from "../server.js";
 import { Glow, shapesOf } from "./glow.js";
 import { Grab } from "./grab.js";
-import { ABOVE, placeNear } from "./place_near.js";
+import { placeBeside, placeNear } from "./place_near.js";
 
 const EVERY = 40; // ms between two commands of a drag
 const READ = 250; // ms between two reads of the angle in the bar
@@ -240,12 +240,7 @@ export class Joints {
     this.#label.hidden = words === null;
     if (words === null || !pixel) return;
     write(this.#label, words);
-    const { offsetLeft, offsetTop } = this.#scene;
-    const { width } = this.#viewer.canvas.getBoundingClientRect();
-    const down = this.#drag?.touch ? -ABOVE : 14;
-    const right = pixel[0] + 18 + this.#label.offsetWidth > width;
-    this.#label.style.left = `${offsetLeft + pixel[0] + (right ? -12 - this.#label.offsetWidth : 18)}px`;
-    this.#label.style.top = `${offsetTop + pixel[1] + down}px`;
+    placeBeside(this.#label, this.#scene, pixel, Boolean(this.#drag?.touch));
   }
 
   // Highlight the link of the joint that is dragged, under the pointer, or selected.

@@ -4,6 +4,7 @@ import { matches, sceneIn, styled } from "../dom.js";
 import { readArm } from "../server.js";
 import { Branches } from "./branches.js";
 import { Glow, shapesOf } from "./glow.js";
+import { Handle } from "./handle.js";
 import { Joints } from "./joints.js";
 import { Views } from "./views.js";
 
@@ -18,6 +19,7 @@ export class Stage {
   #scene;
   #page;
   #joints;
+  #handle;
   #views;
   /** @type {Branches | null} */
   #branches = null; // only for an arm that has some
@@ -39,10 +41,15 @@ export class Stage {
     this.#page = page;
     styled("scene.css", import.meta.url);
     this.#joints = new Joints(stage, scene, page);
+    this.#handle = new Handle(stage, scene, page.store);
     this.#load();
     this.#views = new Views(stage, scene);
     this.#listen();
-    if (window.katana) window.katana.turned = () => this.#views.turned();
+    Object.assign(window.katana ?? {}, {
+      turned: () => this.#views.turned(),
+      /** @param {ViserPage.Message} message */
+      dragged: (message) => this.#handle.hear(message),
+    });
     scene.addEventListener("load", () => this.#listen());
     // What is held at a stop, or when another person drives, moves nothing afterwards.
     let stopped = false;
@@ -84,6 +91,7 @@ export class Stage {
   // Release what the pointer holds.
   drop() {
     this.#joints.drop();
+    this.#handle.drop();
   }
 
   /** @param {Api.Refused} answer */
@@ -102,6 +110,7 @@ export class Stage {
     on("pointercancel", ({ pointerId }) => this.#joints.holds(pointerId) && this.#joints.lose());
     on("pointerout", ({ relatedTarget }) => relatedTarget || this.#hover(null));
     on("blur", this.#blur);
+    this.#handle.listen(inner);
     on("dblclick", this.#focus);
     this.#branches?.listen(inner);
   }
@@ -114,6 +123,7 @@ export class Stage {
   /** @param {PointerEvent} event */
   #down(event) {
     const { target, pointerId, pointerType, button, isPrimary } = event;
+    this.#handle.note(event);
     this.#press = null;
     if (button || !isPrimary || this.#joints.dragging || !matches(target, "canvas")) return;
     /** @type {Page.Pixel} */
@@ -132,6 +142,7 @@ export class Stage {
   #move(event) {
     /** @type {Page.Pixel} */
     const pixel = [event.clientX, event.clientY];
+    this.#handle.note(event);
     if (this.#joints.holds(event.pointerId)) {
       event.stopImmediatePropagation();
       this.#joints.move(pixel);

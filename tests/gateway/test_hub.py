@@ -20,6 +20,7 @@ from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.pipes.state_publisher import Snapshot
 from katana450.errors import LeaseError
+from katana450.maths.collision.engine import Contact
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api import answers, requests
 from katana450.server.service.arm_handle import ArmHandle
@@ -44,6 +45,7 @@ class FakeArm:
     loop_timing: Any
     session: Session
     planning_failure = ""
+    nearest: Contact | None = None
 
     def __init__(self, state: State) -> None:
         self.rest = state

@@ -8,6 +8,7 @@ import time
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from katana450.arm.control.commands import commands as cmd
@@ -17,6 +18,7 @@ from katana450.arm.control.state.messages import STATUS
 from katana450.arm.control.state.state import Finding, Reason, Status
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.server.page_state import ENDS, duration
+from katana450.maths.collision.engine import Contact
 from katana450.server.api.program_requests import ProgramOrder
 from tests.gateway.client import Control
 from tests.gateway.test_hub import PAGES
@@ -48,6 +50,29 @@ def test_pace_is_refused_with_a_reason_to_all_but_the_driver(table: Staged) -> N
     assert table.bar(other)["pace"] == "Window 1 drives: ask for the arm."
     viewer = table.join("third", Role.VIEWER)
     assert table.bar(viewer)["pace"] == "You may watch, not drive."
+
+
+@pytest.mark.parametrize(
+    ("distance", "shown"),
+    [
+        (
+            0.00512,
+            {
+                "distance": 5.1,
+                "parts": ["left finger", "table"],
+                "points": [[0.3, 0.0, 0.0051], [0.3, 0.0, 0.0]],
+            },
+        ),
+        (0.031, None),
+    ],
+)
+def test_two_nearest_parts_are_shown_below_30_mm(
+    table: Staged, distance: float, shown: dict[str, Any] | None
+) -> None:
+    points = np.array([[0.3, 0.0, distance], [0.3, 0.0, 0.0]])
+    normal = np.array([0.0, 0.0, -1.0])
+    table.arm.nearest = Contact(("finger_left_link", "table"), distance, points, normal)
+    assert table.bar(table.driver())["clearance"] == shown
 
 
 def test_stop_is_in_progress_until_the_arm_rests(table: Staged) -> None:

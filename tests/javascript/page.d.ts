@@ -35,8 +35,12 @@ declare namespace Page {
     fraction: number; orders: Api.ProgramOrder[]; continues: [] | [string, number, number]; age: number;
     /** Names of what can be undone and redone, the newest first. */
     undo?: string[]; redo?: string[];
+    clearance: Clearance | null;
     cautions?: string; episodes?: EpisodesState | null; robot?: Robot | null;
   }
+
+  /** The two nearest parts: their distance [mm], and the nearest point of each in m of viser's world. */
+  interface Clearance { distance: number; parts: [string, string]; points: [Vector, Vector]; }
 
   /** The robot that the server drives; see `extensions/robot_choice/choose_robot.py`. */
   interface Robot { name: string; key: string; loading: string | null; problem: string; }
@@ -127,7 +131,7 @@ declare namespace ViserPage {
   /** A message between viser's page and its server; a type has some of the fields. */
   interface Message {
     type: string; uuid?: string; name?: string; visible?: boolean; props?: ControlProps; updates?: ControlProps;
-    position?: number[]; look_at?: number[]; up_direction?: number[]; initial?: boolean; count?: number;
+    position?: number[]; wxyz?: number[]; look_at?: number[]; up_direction?: number[]; initial?: boolean; count?: number;
     dark_mode?: boolean; rgb_data?: Uint8Array; made?: number;
   }
   interface ControlProps { label?: string; value?: string; step?: number; min?: Limit; max?: Limit; }
@@ -147,7 +151,7 @@ interface Window {
   /** Set by page.js for the frame that viser's page is in. */
   katana?: {
     key(event: KeyboardEvent): void; blur(): void; toast(words: string): void; drawn(): void; used(): void;
-    closeSheets(): void; live(): void; turned?(): void; entered?: Promise<URLSearchParams>;
+    closeSheets(): void; live(): void; turned?(): void; dragged?(message: ViserPage.Message): void; entered?: Promise<URLSearchParams>;
   };
   /** Set by frame.js in viser's page. */
   katanaScene?: Page.Scene;

@@ -22,6 +22,7 @@ from katana450.arm.runtime.pipes.front_end import FrontEnd
 from katana450.arm.runtime.pipes.state_publisher import LoopTiming, Snapshot
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.errors import InputError
+from katana450.maths.collision.engine import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.statics import holding_torques
@@ -96,6 +97,11 @@ class ArmHandle:
         Raises InputError for a mechanism that has only joints.
         """
         return self._posture()[0]
+
+    @property
+    def nearest(self) -> Contact | None:
+        """The two nearest parts; None for a mechanism without a tool, or if none can meet."""
+        return None if self.robot.arm is None else self.margins.nearest
 
     def _posture(self) -> tuple[Margins, FloatArray | None]:
         """Return margins and torques, computed again only when tool, world or posture change."""

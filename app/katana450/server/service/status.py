@@ -11,7 +11,7 @@ import numpy as np
 from katana450.arm.control.lease import Person
 from katana450.arm.control.session.supervision import tracking_error
 from katana450.arm.control.state.arm_report import ArmMode, ArmReport
-from katana450.arm.control.state.messages import headline, mood, sentence
+from katana450.arm.control.state.messages import headline, mood, part, sentence
 from katana450.arm.control.state.state import State, Status
 from katana450.arm.runtime.pipes.stop_messages import NO_STATE
 from katana450.server.service.hub import Hub
@@ -35,6 +35,9 @@ UNCONTROLLED: Mapping[ArmMode | None, tuple[StatusLine, str]] = {
 
 MIN_SHOWN_AGE = 0.2
 """Minimum age of a picture [s] that the page shows."""
+
+SHOWN_CLEARANCE = 0.03
+"""Distance [m] of the two nearest parts below which the page shows it."""
 
 
 def silence(hub: Hub) -> float | None:
@@ -101,6 +104,21 @@ def arm_status(state: State, report: ArmReport) -> dict[str, Any]:
     }
 
 
+def clearance(hub: Hub) -> dict[str, Any] | None:
+    """Return what a page shows of the two nearest parts; None if they are not near each other.
+
+    The distance is in mm, the points are in the base frame [m].
+    """
+    nearest = None if hub.arm is None else hub.arm.nearest
+    if nearest is None or nearest.distance > SHOWN_CLEARANCE:
+        return None
+    return {
+        "distance": round(1e3 * nearest.distance, 1),
+        "parts": [part(name) for name in nearest.parts],
+        "points": nearest.points.round(4).tolist(),
+    }
+
+
 def pace_refusal(hub: Hub, participant: Participant) -> str:
     """Return why ``participant`` may not pause, resume or slow down the arm; empty if allowed."""
     driver, program, person = hub.lease.driver, hub.gate.program, participant.person
@@ -129,6 +147,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "speed": 1.0 if state is None else state.speed,
         "paused": state is not None and state.paused,
         "arm": None if state is None or state.report is None else arm_status(state, state.report),
+        "clearance": clearance(hub),
         "participants": len(hub.participants),
         "revocations": hub.gate.revocations,
         # A robot without a tool has only joints, which scripts do not move.

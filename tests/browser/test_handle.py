@@ -1,0 +1,91 @@
+"""The handle at the tool: the label, the steps and the typed number while it is dragged."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.browser.conftest import OpenPage
+from tests.browser.finger import fingers
+from tests.browser.page import ViserPage
+from tests.browser.person import still
+from tests.browser.server import AppServer
+from tests.browser.session import MOVE, Truth, take
+from tests.browser.sizes import PHONE, PORTRAIT
+
+PITCH = "/target/move/pitch"
+
+PIXEL = 2.0
+"""Distance [mm] of a dragged handle from its target: the picture has coarse pixels."""
+
+
+def label(page: ViserPage) -> str:
+    shown = page.page.locator("#handle-label")
+    return shown.inner_text() if shown.is_visible() else ""
+
+
+def number(text: str) -> float:
+    """Return the first number of ``text``, whose minus is a true one."""
+    match = re.search(r"[+−]?\d+\.\d", text)
+    assert match, text
+    return float(match[0].replace("−", "-"))
+
+
+def test_label_says_what_a_drag_changes_until_its_end(
+    page: ViserPage, truth: Truth, artefacts: Path
+) -> None:
+    start = truth.status()["T"][2][3]
+    with page.grip_arrow(MOVE, "z") as grip:
+        assert label(page) == ""
+        grip.sweep(0.04, 6)
+        page.wait_until(lambda: label(page).startswith("z +"), "the label")
+        assert number(label(page)) == pytest.approx(40.0, abs=PIXEL)
+        assert page.page.get_attribute("#handle-label", "aria-hidden") == "true"
+        page.keep(artefacts / "handle-label.png")
+    page.wait_until(lambda: label(page) == "", "the label to go")
+    truth.wait(20.0, moving=False)
+    assert truth.status()["T"][2][3] - start == pytest.approx(0.04, abs=1e-3 * PIXEL)
+    with page.grip_ring(PITCH, "y") as grip:
+        grip.sweep(-0.2, 6)
+        page.wait_until(lambda: label(page).startswith("pitch −"), "the angle")
+        assert number(label(page)) == pytest.approx(-11.5, abs=3.0)
+        assert label(page).endswith("°")
+
+
+def test_label_says_how_near_the_nearest_part_is(
+    page: ViserPage, truth: Truth, artefacts: Path
+) -> None:
+    with page.grip_arrow(MOVE, "z") as grip:
+        grip.sweep(-0.3, 6)
+        page.wait_until(lambda: label(page).endswith(" mm to the table"), "the table", seconds=20.0)
+        truth.wait(20.0, moving=False)
+        distance = 1e3 * truth.status()["margins"]["clearance"]
+        page.wait_until(
+            lambda: f"\n{distance:.1f} mm to the table" in label(page), f"{distance:.1f} mm"
+        )
+        page.keep(artefacts / "handle-near.png")
+
+
+@pytest.mark.long
+def test_label_is_above_the_finger(
+    server: AppServer, open_page: OpenPage, truth: Truth, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE), window=PORTRAIT, own_camera=True, **PHONE)
+    page.page.wait_for_selector("#views", state="attached")
+    take(page)
+    truth.wait(20.0, moving=False)
+    still(page, lambda: page.project(page.node_pose(MOVE)[:3, 3]))
+    start, end = page.grip_arrow(MOVE, "z").pixels(0.04)
+    with fingers(page.page) as hand:
+        hand.put(start)
+        hand.move(end)
+        page.wait_until(lambda: label(page).startswith("z +"), "the label")
+        box = page.page.locator("#handle-label").bounding_box()
+        assert box is not None
+        assert box["y"] + box["height"] < end[1] - 30.0
+        page.keep(artefacts / "handle-phone.png")
+        hand.lift()
+    page.wait_until(lambda: label(page) == "", "the label to go")
+    assert page.errors == []
