@@ -24,7 +24,6 @@ from katana450.maths.water.flow import (
     WaterFlow,
     drained_film,
     left_over,
-    viscous_flow,
     weir_flow,
     withdrawn_thickness,
 )
@@ -277,33 +276,25 @@ def test_bad_numbers_are_refused(flow: WaterFlow) -> None:
 RADIUS, TILT, HEAD = 0.03, 1.0, 0.002
 
 
-def along_the_lip(rule: float, power: float) -> float:
-    """Return the flow [m^3/s] by quadrature: ``rule`` times the local head to ``power``."""
+def test_flow_is_the_integral_over_the_lip() -> None:
+    rule = 2.0 / 3.0 * DISCHARGE * np.sqrt(2.0 * GRAVITY)
     x = (np.arange(200_000) + 0.5) * (RADIUS / 200_000)
-    height = np.maximum(HEAD - x**2 * np.sin(TILT) / (2.0 * RADIUS), 0.0)
-    return 2.0 * RADIUS * rule * float((height**power).mean())
-
-
-def test_flows_are_the_integrals_over_the_lip() -> None:
-    weir = along_the_lip(2.0 / 3.0 * DISCHARGE * np.sqrt(2.0 * GRAVITY), 1.5)
+    head = np.maximum(HEAD - x**2 * np.sin(TILT) / (2.0 * RADIUS), 0.0)
+    weir = 2.0 * RADIUS * rule * float((head**1.5).mean())
     assert weir_flow(RADIUS, TILT, HEAD, GRAVITY) == pytest.approx(weir, rel=1e-4)
-    film = along_the_lip(DENSITY * GRAVITY / (3.0 * VISCOSITY), 3.0)
-    assert viscous_flow(RADIUS, TILT, HEAD, GRAVITY) == pytest.approx(film, rel=1e-4)
 
 
 @repeatable
-@given(st.floats(1e-8, 1e-4), st.floats(1e-8, 1e-4), st.integers(1, 40))
-def test_many_steps_leave_what_one_leaves(weir: float, viscous: float, count: int) -> None:
-    """One of the two laws holds alone, and its flow falls with the volume."""
+@given(st.floats(1e-8, 1e-4), st.integers(1, 40))
+def test_many_steps_leave_what_one_leaves(weir: float, count: int) -> None:
+    """The flow falls with the square of the volume."""
     start, dt = 20 * MILLILITRE, 0.01
-    for flows, power in (((weir, 1e3), 2.0), ((1e3, viscous), 3.5)):
-        once = left_over(start, *flows, count * dt)
-        left = start
-        for _ in range(count):
-            fallen = (left / start) ** power
-            if left:
-                left = left_over(left, flows[0] * fallen, flows[1] * fallen, dt)
-        assert left == pytest.approx(once, rel=1e-6, abs=MILLILITRE // 10)
+    once = left_over(start, weir, count * dt)
+    left = start
+    for _ in range(count):
+        if left:
+            left = left_over(left, weir * (left / start) ** 2, dt)
+    assert left == pytest.approx(once, rel=1e-6, abs=MILLILITRE // 10)
 
 
 @repeatable

@@ -85,66 +85,38 @@ DROP_VOLUME = MILLILITRE // 20
 """Volume [fl] of a drop: what is over the lip falls once it is as much, and the last drop at once.
 """
 
-WEIR_PARABOLA, FILM_PARABOLA = 3.0 * math.pi / 8.0, 32.0 / 35.0
-"""Integrals of (1 - s^2)^(3/2) and of (1 - s^2)^3 over s from -1 to 1: the flow over an edge that
-rises as a parabola, over that with its greatest head everywhere on half its wet width.
+WEIR_PARABOLA = 3.0 * math.pi / 8.0
+"""Integral of (1 - s^2)^(3/2) over s from -1 to 1: the flow over an edge that rises as a parabola,
+over that with its greatest head everywhere on half its wet width.
 """
 
 
 def weir_flow(radius: float, tilt: float, head: float, g: float) -> float:
-    """Return the flow over the lip [m^3/s] without viscosity; the surface is ``head`` [m] above it.
+    """Return the flow over the lip [m^3/s]; the surface is ``head`` [m] above it.
 
     Poleni's rule, (2/3) C sqrt(2 g) head^(3/2) per metre of edge (Chow, Open-Channel Hydraulics,
     1959), summed over the part of the rim below the surface, which is a parabola near its lowest
     point. The result is at most the flow over the whole rim at that head.
     """
-    rule = 2.0 / 3.0 * DISCHARGE * math.sqrt(2.0 * g * head) * head
-    return rule * _wet_width(radius, tilt, head, WEIR_PARABOLA)
-
-
-def viscous_flow(radius: float, tilt: float, head: float, g: float) -> float:
-    """Return the maximum flow over the lip [m^3/s] that its viscosity allows.
-
-    A film as thick as the head runs down the outside of the lip: rho g head^3 / (3 mu) per metre of
-    edge (Nusselt, 1916; Bird, Stewart and Lightfoot, Transport Phenomena, 2nd ed., ch. 2.2),
-    summed as for ``weir_flow``.
-    """
-    rule = DENSITY * g * head**3 / (3.0 * VISCOSITY)
-    return rule * _wet_width(radius, tilt, head, FILM_PARABOLA)
+    whole, sine = math.tau * radius, math.sin(tilt)
+    wet = WEIR_PARABOLA * math.sqrt(2.0 * radius * head / sine) if sine > 0.0 else whole
+    return lip_speed(head, g) * head * min(wet, whole)
 
 
 def lip_speed(head: float, g: float) -> float:
-    """Return the mean speed [m/s] at the lowest point of the lip, by the slower of both rules."""
-    film = DENSITY * g * head**2 / (3.0 * VISCOSITY)
-    return min(2.0 / 3.0 * DISCHARGE * math.sqrt(2.0 * g * head), film)
+    """Return the mean speed [m/s] at the lowest point of the lip, by Poleni's rule."""
+    return 2.0 / 3.0 * DISCHARGE * math.sqrt(2.0 * g * head)
 
 
-def left_over(over: int, weir: float, viscous: float, dt: float) -> int:
+def left_over(over: int, weir: float, dt: float) -> int:
     """Return the part of ``over`` [fl] that is still above the lip after ``dt`` [s].
 
-    The flow ``weir`` [m^3/s] falls with the square of the volume above the lip, and the ``viscous``
-    flow with its power 3.5; the slower one holds. Besides, what is left thins.
+    The flow ``weir`` [m^3/s] falls with the square of the volume above the lip. Besides, what is
+    left thins. Both together are an equation of Bernoulli.
     """
-    volume = over * FEMTOLITRE
-    if viscous + volume / THINNING_TIME < REST_FLOW:
-        return over
-    left = over * max(
-        _remaining(weir / volume * THINNING_TIME, 1.0, dt / THINNING_TIME),
-        _remaining(viscous / volume * THINNING_TIME, 2.5, dt / THINNING_TIME),
-    )
+    flow, t = weir / (over * FEMTOLITRE) * THINNING_TIME, dt / THINNING_TIME
+    left = over * math.exp(-t) / (1.0 - flow * math.expm1(-t))
     return int(left) if left > DROP_VOLUME else 0
-
-
-def _remaining(flow: float, power: float, t: float) -> float:
-    """Return E(t) of E' = -flow E^(1 + power) - E with E(0) = 1, an equation of Bernoulli."""
-    return math.exp(-t - math.log1p(-flow * math.expm1(-power * t)) / power)
-
-
-def _wet_width(radius: float, tilt: float, head: float, parabola: float) -> float:
-    """Return the width [m] of the edge that has the same flow with the full head everywhere."""
-    whole, sine = math.tau * radius, math.sin(tilt)
-    wet = parabola * math.sqrt(2.0 * radius * head / sine) if sine > 0.0 else whole
-    return min(wet, whole)
 
 
 MAX_FILM = 0.25
@@ -353,9 +325,7 @@ class WaterFlow:
             return replace(water, T=T), None
         head = max(-inside.margin(tilt, inside.level(tilt, water.volume * FEMTOLITRE)), 0.0)
         g = GRAVITY * weight
-        weir = weir_flow(inside.radius, tilt, head, g)
-        viscous = viscous_flow(inside.radius, tilt, head, g)
-        poured = over - left_over(over, weir, viscous, dt)
+        poured = over - left_over(over, weir_flow(inside.radius, tilt, head, g), dt)
         if poured == 0:
             return replace(water, T=T), None
         mouth = self.water_environment.vessels[water.name].mouth

@@ -37,7 +37,6 @@ from katana450.maths.water.flow import (
     THINNING_TIME,
     VesselWater,
     Water,
-    viscous_flow,
     weir_flow,
     withdrawn_thickness,
 )
@@ -53,9 +52,7 @@ def flow_at(tilt: float, volume: float, cup: Cylinder) -> float:
     head = -cup.margin(tilt, cup.level(tilt, volume))
     if over <= 0.0 or head <= 0.0:
         return 0.0
-    weir = weir_flow(cup.radius, tilt, head, GRAVITY)
-    thick = viscous_flow(cup.radius, tilt, head, GRAVITY)
-    return min(weir, thick) + over / THINNING_TIME
+    return weir_flow(cup.radius, tilt, head, GRAVITY) + over / THINNING_TIME
 
 
 def tilt_for(flow: float, volume: float, cup: Cylinder) -> float:
