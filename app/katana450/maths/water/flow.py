@@ -407,8 +407,7 @@ class WaterFlow:
             if end.age > aged.age:
                 flying.append(aged)
             elif end.ground is Ground.BASIN:
-                caught = int(parcel.volume * end.fraction)
-                stays = min(caught, self._basin_holds - basin)
+                stays = min(parcel.volume, self._basin_holds - basin)
                 basin += stays
                 if stays < parcel.volume:
                     puddles = spill(puddles, self._beside_basin(end.point), parcel.volume - stays)

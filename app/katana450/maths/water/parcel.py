@@ -1,6 +1,6 @@
 """Water in the air, in parcels that fly freely, and spilled, in a few puddles that merge.
 
-A parcel flies in vacuum, so that its fall is exact, and lands on a disc that grows with its path.
+A parcel flies in vacuum, so that its fall is exact, and lands where its middle does.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from typing import NamedTuple
 from katana450.maths.water.environment import Basin, WaterEnvironment
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY
 from katana450.maths.water.vectors import Vector, add, scale
-from katana450.tolerances import ROUNDING
 
 THICKNESS = 2.7e-3
 """Thickness [m] of a large puddle with a contact angle of 60 degrees: 2 sin(30 degrees) times the
@@ -52,16 +51,6 @@ def spill(puddles: tuple[Puddle, ...], point: Vector, volume: int) -> tuple[Pudd
     return tuple(joined if puddle is near else puddle for puddle in puddles)
 
 
-SPREAD = 0.03
-"""Growth of the radius of a stream over its path [1]: 3 to 4 % for rough turbulent jets in air, and
-less than 1 % for smooth ones (Ervine and Falvey, Behaviour of turbulent water jets in the
-atmosphere and in plunge pools, Proc. Inst. Civ. Eng. 83, 1987).
-"""
-
-MIN_SPEED = 0.05
-"""Speed [m/s] below which a stream at the lip is no wider than at this speed."""
-
-
 class Parcel(NamedTuple):
     """The water that left the lip in one step.
 
@@ -84,12 +73,6 @@ class Parcel(NamedTuple):
         (x, y, z), (u, v, w) = self.start, self.velocity
         return x + u * age, y + v * age, z + (w - 0.5 * GRAVITY * age) * age
 
-    def radius_at(self, age: float) -> float:
-        """Return the radius [m] of the disc over which it is spread at ``age`` [s]."""
-        speed = max(math.hypot(*self.velocity), MIN_SPEED)
-        jet = math.sqrt(self.volume * FEMTOLITRE / (math.pi * self.span * speed))
-        return jet + SPREAD * math.dist(self.start, self.at(age))
-
     def falls_to(self, z: float) -> float | None:
         """Return the age [s] at which it falls through the height ``z`` [m], or None."""
         w = self.velocity[2]
@@ -107,19 +90,11 @@ class Ground(Enum):
 
 
 class Landing(NamedTuple):
-    """The landing of a parcel.
-
-    Attributes:
-        ground: the ground of its middle, or the basin if that receives a part.
-        age: age [s].
-        point: place [m] of its middle.
-        fraction: fraction of it that lands on the ground; the rest lands beside it.
-    """
+    """The landing of a parcel: its ground, its age [s], and the place [m] of its middle."""
 
     ground: Ground
     age: float
     point: Vector
-    fraction: float = 1.0
 
 
 def landing(parcel: Parcel, water_environment: WaterEnvironment, level: float) -> Landing:
@@ -129,10 +104,9 @@ def landing(parcel: Parcel, water_environment: WaterEnvironment, level: float) -
     are ignored.
     """
     basin = water_environment.basin
-    fraction = _into(basin, parcel)
-    if fraction > 0.0:
+    if _is_into(basin, parcel):
         age = parcel.falls_to(basin.at[2] + basin.floor + level) or 0.0
-        return Landing(Ground.BASIN, age, parcel.at(age), fraction)
+        return Landing(Ground.BASIN, age, parcel.at(age))
     age = parcel.falls_to(0.0) or 0.0
     x, y, _ = parcel.at(age)
     (west, east), (south, north) = water_environment.table.x, water_environment.table.y
@@ -143,29 +117,13 @@ def landing(parcel: Parcel, water_environment: WaterEnvironment, level: float) -
     return Landing(Ground.FLOOR, age, (x, y, water_environment.table.floor))
 
 
-def overlap(distance: float, a: float, b: float) -> float:
-    """Return the fraction of a disc of radius ``a`` inside one of ``b``, ``distance`` away; [m]."""
-    if distance + a <= b:
-        return 1.0
-    # Half the angles of the arcs of both discs up to the corners of the lens; 0 and pi where there
-    # are no corners.
-    distance = max(distance, ROUNDING * a)
-    p = math.acos(min(max((distance**2 + a**2 - b**2) / (2.0 * distance * a), -1.0), 1.0))
-    q = math.acos(min(max((distance**2 + b**2 - a**2) / (2.0 * distance * b), -1.0), 1.0))
-    return (
-        p - math.sin(p) * math.cos(p) + (q - math.sin(q) * math.cos(q)) * (b / a) ** 2
-    ) / math.pi
-
-
-def _into(basin: Basin, parcel: Parcel) -> float:
-    """Return the fraction of ``parcel`` that lands in ``basin``."""
+def _is_into(basin: Basin, parcel: Parcel) -> bool:
+    """Return whether the middle of ``parcel`` lands in ``basin``."""
     age = parcel.falls_to(basin.rim)
     if age is not None:
         x, y, _ = parcel.at(age)
-        away = math.hypot(x - basin.at[0], y - basin.at[1])
-        return overlap(away, parcel.radius_at(age), basin.rim_radius)
+        return math.hypot(x - basin.at[0], y - basin.at[1]) < basin.rim_radius
     # It never falls through the rim: it is in the basin only if it left its cup there.
     x, y, z = parcel.start
     height = z - basin.at[2] - basin.floor
-    inside = math.hypot(x - basin.at[0], y - basin.at[1]) < basin.radius(height)
-    return float(height >= 0.0 and inside)
+    return height >= 0.0 and math.hypot(x - basin.at[0], y - basin.at[1]) < basin.radius(height)
