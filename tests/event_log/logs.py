@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 from katana450.arm.control.lease import SERVER
-from katana450.assembly.event_log.disk_log import MAX_FILE_BYTES, MAX_FILES, DiskLog, log_files
+from katana450.assembly.event_log import disk_log
+from katana450.assembly.event_log.disk_log import MAX_FILE_BYTES, MAX_FILES, PRESENT, DiskLog
 from katana450.assembly.event_log.record_maker import Record
 from katana450.server.service.recorder import Recorder
 
@@ -22,7 +24,8 @@ class Writer:
         self, folder: Path, max_bytes: int = MAX_FILE_BYTES, files: int = MAX_FILES
     ) -> None:
         self.recorder = Recorder()
-        self._log = DiskLog(self.recorder, folder, 8080, max_bytes, files)
+        with patch.multiple(disk_log, MAX_FILE_BYTES=max_bytes, MAX_FILES=files):
+            self._log = DiskLog(self.recorder, folder, 8080)
 
     def note(self, *contents: Any) -> None:
         """Note events that are always recorded, with ``contents``."""
@@ -44,6 +47,12 @@ def write(folder: Path, *contents: Any, max_bytes: int = MAX_FILE_BYTES, files: 
 def numbered(count: int) -> list[dict[str, int]]:
     """Return the contents of ``count`` different records."""
     return [{"value": n} for n in range(count)]
+
+
+def log_files(folder: Path) -> list[Path]:
+    """Return the files of the log, the oldest first."""
+    numbers = {path: int(path.suffix[1:]) for path in folder.glob(f"{PRESENT}.*")}
+    return [*sorted(numbers, key=numbers.__getitem__, reverse=True), *folder.glob(PRESENT)]
 
 
 def lines(folder: Path) -> list[bytes]:

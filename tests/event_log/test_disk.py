@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from katana450.assembly.event_log.disk_log import PRESENT, LogFile
+from katana450.assembly.event_log.disk_log import PRESENT, LogFiles
 from katana450.assembly.event_log.record_maker import Record
 from katana450.client import connect
 from katana450.server.api import requests
@@ -52,15 +52,15 @@ def test_writer_continues_when_a_full_disk_has_room_again(
 def test_lost_records_stand_between_those_before_and_after_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    written, room = LogFile.append, [3]
+    written, room = LogFiles.append, [3]
 
-    def append(file: LogFile, content: Record) -> None:
+    def append(file: LogFiles, content: Record) -> None:
         if not room[0]:
             raise OSError(28, "No space left on device")
         room[0] -= 1
         written(file, content)
 
-    monkeypatch.setattr(LogFile, "append", append)
+    monkeypatch.setattr(LogFiles, "append", append)
     writer = Writer(tmp_path)
     writer.note(*numbered(6))
     until(lambda: not room[0])

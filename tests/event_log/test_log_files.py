@@ -6,9 +6,9 @@ import stat
 import sys
 from pathlib import Path
 
-from katana450.assembly.event_log.disk_log import PRESENT, log_files
+from katana450.assembly.event_log.disk_log import PRESENT
 from katana450.assembly.event_log.record_maker import MAX_TEXT
-from tests.event_log.logs import lines, numbered, records, write
+from tests.event_log.logs import lines, log_files, numbered, records, write
 
 BREAKS = ["\n", "\r", "\v", "\f", "\x00", "\x1b[2K\x1b[31m", "\x85", "\u2028", "\u2029", "\u202e"]
 """Characters that end a line or control a terminal."""

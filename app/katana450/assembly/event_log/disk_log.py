@@ -9,17 +9,19 @@ from __future__ import annotations
 import json
 import logging
 import os
+import sys
 import threading
 import time
 from contextlib import suppress
-from datetime import UTC, datetime
+from io import TextIOWrapper
+from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from queue import Empty
 
 from katana450.arm.control.lease import SERVER
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.assembly.event_log.record_maker import Record, RecordMaker, record
-from katana450.platform_support import claim_file, open_bytes
+from katana450.platform_support import claim_file
 from katana450.server.service.recorder import Note, Recorder
 
 log = logging.getLogger(__name__)
@@ -52,18 +54,11 @@ CLOSE_TIMEOUT = 2.0
 class DiskLog:
     """Writes the notes of ``recorder`` to a folder, which is created when needed."""
 
-    def __init__(
-        self,
-        recorder: Recorder,
-        folder: Path,
-        port: int,
-        max_file_bytes: int = MAX_FILE_BYTES,
-        max_files: int = MAX_FILES,
-    ) -> None:
+    def __init__(self, recorder: Recorder, folder: Path, port: int) -> None:
         """Start the thread, and write the start of the server on ``port``."""
         self._recorder = recorder
         self._maker = RecordMaker()
-        self._file = LogFile(folder, max_file_bytes, max_files)
+        self._folder, self._files = folder, LogFiles(folder)
         self._lost, self._retry_at = 0, 0.0
         self._now = MonotonicClock().now
         self._thread = threading.Thread(target=self._run, name="event log", daemon=True)
@@ -98,7 +93,7 @@ class DiskLog:
             records = self._made([note for note in notes if note is not None], closing=closing)
             self._write(records, closing=closing)
             time.sleep(0.0 if closing else COLLECTING)
-        self._file.close()
+        self._files.close()
 
     def _made(self, notes: list[Note], *, closing: bool) -> list[Record]:
         lost, self._recorder.lost = self._recorder.lost, 0
@@ -116,14 +111,12 @@ class DiskLog:
             self._lost += left
             return
         try:
-            if not self._file.is_open:
-                self._file.open()
             if self._lost:
                 why = problem or "Too many events came at once."
-                self._file.append(record("lost", {"count": self._lost}, why=why))
+                self._files.append(record("lost", {"count": self._lost}, why=why))
                 self._lost = 0
             for content in records:
-                self._file.append(content)
+                self._files.append(content)
                 left -= 1
         except Exception as error:
             # Also of a record that is no JSON: the log continues after every error.
@@ -131,11 +124,11 @@ class DiskLog:
             self._fail(error)
         else:
             if problem:
-                log.warning("The event log in %s is written again.", self._file.folder)
+                log.warning("The event log in %s is written again.", self._folder)
                 self._recorder.problem = ""
 
     def _fail(self, error: Exception) -> None:
-        self._file.close()
+        self._files.close()
         self._retry_at = time.monotonic() + RETRY_INTERVAL
         if not self._recorder.problem:
             why = error.strerror if isinstance(error, OSError) else None
@@ -143,94 +136,56 @@ class DiskLog:
                 why = "another server writes there"
             # Everybody sees this text, so it does not name the folder.
             problem = f"The event log cannot be written: {why or error}."
-            log.error("%s Folder: %s. Later records are counted.", problem, self._file.folder)
+            log.error("%s Folder: %s. Later records are counted.", problem, self._folder)
             self._recorder.problem = problem
 
 
-def log_files(folder: Path) -> list[Path]:
-    """Return the files of the log in ``folder``, the oldest first."""
-    return [*sorted(folder.glob("events-*.jsonl")), *folder.glob(PRESENT)]
+class LogFiles(RotatingFileHandler):
+    """Appends records to the log in a folder, and begins new files. For one thread."""
 
+    def __init__(self, folder: Path) -> None:
+        """Open nothing yet. The folder is created when it is needed."""
+        super().__init__(
+            folder / PRESENT, "a", MAX_FILE_BYTES, MAX_FILES - 1, encoding="ascii", delay=True
+        )
 
-class LogFile:
-    """Appends records to the log in ``folder``. For one thread.
+    def append(self, content: Record) -> None:
+        """Append ``content``, in a new file if the present one is full.
 
-    Every method may raise OSError. The log then has to be opened again; what was appended before
-    stays.
-    """
-
-    def __init__(self, folder: Path, max_file_bytes: int, max_files: int) -> None:
-        self.folder = folder
-        self._max_file_bytes, self._max_files = max_file_bytes, max_files
-        self._file, self._size = -1, 0
-
-    @property
-    def is_open(self) -> bool:
-        """True between ``open`` and ``close``."""
-        return self._file >= 0
-
-    def open(self) -> None:
-        """Open the present file, and create it if it is missing.
-
-        Raises BlockingIOError if another server writes there.
+        Raises OSError, of which BlockingIOError if another server writes there, and every error of
+        a record that is no JSON.
         """
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        path = self.folder / PRESENT
-        self._file = open_bytes(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
-        try:
-            claim_file(self._file)
-            self._size = os.fstat(self._file).st_size
-            if self._size and not _ends_line(path):
-                # A killed server was writing this line.
-                self._write(b"\n")
-        except OSError:
-            self.close()
-            raise
+        self.emit(logging.makeLogRecord({"msg": encoded(content)}))
 
-    def append(self, record: Record) -> None:
-        """Append ``record``; begin a new file before it if the present one is full."""
-        line = encoded(record)
-        if self._size and self._size + len(line) > self._max_file_bytes:
-            self._begin_file()
-        self._write(line)
+    def _open(self) -> TextIOWrapper:
+        path = Path(self.baseFilename)
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        path.touch(0o600)
+        file = super()._open()
+        try:
+            claim_file(file.fileno())
+            if file.tell() and path.read_bytes()[-1:] != b"\n":
+                # A killed server, or one without room on the disk, was writing this line.
+                file.write("\n")
+        except OSError:
+            file.close()
+            raise
+        return file
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: ARG002
+        """Let ``append`` raise the error."""
+        error = sys.exception()
+        assert error is not None
+        raise error
 
     def close(self) -> None:
-        """Close the file; ``open`` opens it again."""
-        if self._file >= 0:
-            with suppress(OSError):
-                os.close(self._file)
-        self._file = -1
-
-    def _begin_file(self) -> None:
-        """Begin a new file, and delete the oldest ones beyond the maximum."""
-        self.close()
-        moment = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")
-        (self.folder / PRESENT).rename(self.folder / f"events-{moment}.jsonl")
-        self.open()
-        for old in log_files(self.folder)[: -self._max_files]:
-            old.unlink()
-
-    def _write(self, line: bytes) -> None:
-        """Write all of ``line`` or nothing."""
-        try:
-            if os.write(self._file, line) != len(line):
-                raise OSError(28, "No space left on device", str(self.folder))
-        except OSError:
-            with suppress(OSError):
-                os.ftruncate(self._file, self._size)
-            raise
-        self._size += len(line)
+        """Close the file; ``append`` opens it again."""
+        with suppress(OSError):
+            super().close()
 
 
-def _ends_line(path: Path) -> bool:
-    """Return whether the last line of a file with content is complete."""
-    with path.open("rb") as file:
-        file.seek(-1, os.SEEK_END)
-        return file.read() == b"\n"
-
-
-def encoded(content: Record) -> bytes:
-    """Return ``content`` as a line with its line feed.
+def encoded(content: Record) -> str:
+    """Return ``content`` as a line without its line feed.
 
     The line is plain ASCII whatever the texts in it: ``json`` escapes line breaks, control
     characters, lone surrogates, and everything else beyond ASCII.
@@ -239,4 +194,4 @@ def encoded(content: Record) -> bytes:
     if len(line) > MAX_LINE_BYTES:
         short: Record = {key: content[key] for key in ("time", "t", "kind") if key in content}
         line = json.dumps(short | {"what": {"omitted_bytes": len(line)}}, separators=(",", ":"))
-    return line.encode("ascii") + b"\n"
+    return line
