@@ -234,8 +234,8 @@ def test_page_hides_nodes_by_itself(page: ViserPage) -> None:
             assert ask(page, f"Viser.handles({{ type: '{handled}' }})")
     with part("phaseOf"):
         kinds = ("DragStart", "Update", "DragEnd")
-        sent = [f"Viser.phaseOf({{ type: 'TransformControls{kind}Message' }})" for kind in kinds]
-        assert ask(page, f"[{', '.join(sent)}]") == ["Start", "Update", "End"]
+        phases = [f"Viser.phaseOf({{ type: 'TransformControls{kind}Message' }})" for kind in kinds]
+        assert ask(page, f"[{', '.join(phases)}]") == ["Start", "Update", "End"]
         assert ask(page, "Viser.phaseOf({ type: 'SceneNodeClickMessage' }) === undefined")
     with part("controls"):
         assert ask(page, "Viser.controls({ type: 'GuiUpdateMessage' })")
