@@ -5,15 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from katana450.errors import InputError
-from katana450.extensions.export.playback import load_motion
 from katana450.extensions.media import figures
 from katana450.extensions.media.measures import PathTrace, PourRecord
 from katana450.extensions.media.report import Report
@@ -40,19 +37,6 @@ def reported(text: str) -> tuple[Planned, Report]:
 @pytest.fixture(scope="module")
 def run() -> tuple[Planned, Report]:
     return reported(TEXT)
-
-
-def test_table_is_read_as_the_motion_that_was_run(
-    run: tuple[Planned, Report], tmp_path: Path
-) -> None:
-    plan, report = run
-    path = tmp_path / "trace.csv"
-    path.write_text(report.csv(), encoding="utf-8")
-    motion = load_motion(path, plan.robot)
-    assert (motion.t == report.run.t - report.run.t[0]).all()
-    for axis, name in enumerate(plan.robot.driven[:5]):
-        # Degrees and back: one rounding each way.
-        assert np.allclose(motion.values[name], report.run.q[:, axis], rtol=4e-16, atol=0.0)
 
 
 def test_table_has_the_water_once_there_is_some(run: tuple[Planned, Report]) -> None:
@@ -117,17 +101,6 @@ def test_flow_is_the_loss_of_the_cup() -> None:
     pour = PourRecord(t, cup, zero, 200.0 - cup, zero, zero, zero, zero)
     assert pour.flow[150] == pytest.approx(80.0)
     assert pour.flow[50] == pour.flow[299] == 0.0
-
-
-def test_broken_table_is_refused_with_its_row(run: tuple[Planned, Report], tmp_path: Path) -> None:
-    plan, report = run
-    path = tmp_path / "trace.csv"
-    lines = report.csv().splitlines()
-    lines[3] = lines[3].replace(lines[3].split(",")[4], "much", 1)
-    path.write_text("\n".join(lines), encoding="utf-8")
-    with pytest.raises(InputError, match=r"Row 3 of .*much"):
-        load_motion(path, plan.robot)
-    assert math.isfinite(report.run.t[-1])
 
 
 def test_the_drawn_error_is_the_largest_of_every_part_of_every_path() -> None:

@@ -101,8 +101,7 @@ def add_shown_options(
         "--trajectory",
         type=Path,
         metavar="FILE",
-        help=f"{formats}motion, a .csv with the columns t,theta1,...,theta5,gripper, or trace.csv "
-        "of a report",
+        help=f"{formats}motion, a .csv with the columns t,theta1,...,theta5,gripper",
     )
     shown.add_argument(
         "--run",

@@ -6,15 +6,12 @@ it has a time [s] and the value of each named joint [rad, m]:
     t,theta1,theta2,theta3,theta4,theta5,gripper
 
 `theta1` is the first driven joint and so on; `gripper` is the driven joint after the fifth. Joints
-can also have their own names. The table of a report, `trace.csv`, is such a file too: its columns
-of times and joints are taken, in its units, and the others left out. Joints that are not named stay
-at zero.
+can also have their own names. Joints that are not named stay at zero.
 """
 
 from __future__ import annotations
 
 import csv
-import math
 import re
 import sys
 from argparse import Namespace
@@ -38,12 +35,6 @@ THETA = re.compile(r"theta([1-9][0-9]?)")
 
 GRIPPER = 6
 """Number of the driven joint that `gripper` names."""
-
-REPORT_COLUMN = re.compile(r"(t|theta[1-9][0-9]?|fingers)_(s|deg|mm)")
-"""Pattern of the columns that are taken from the table of a report, with their units."""
-
-REPORT_UNITS = {"s": 1.0, "deg": math.radians(1.0), "mm": 1e-3}
-"""[s, rad, m] Units of these columns."""
 
 MAX_ROWS = 100_000
 """Maximum number of rows of a file."""
@@ -84,23 +75,15 @@ def _csv_columns(path: Path, text: str) -> dict[str, list[float]]:
     names = rows[0]
     if len(set(names)) != len(names):
         raise InputError(f"{path} names a column twice: {', '.join(names)}.")
-    # Place and unit of each column; a report has more columns than a motion.
-    columns = {name: (place, 1.0) for place, name in enumerate(names)}
-    if names[0] == "t_s":
-        columns = {
-            "gripper" if match[1] == "fingers" else match[1]: (place, REPORT_UNITS[match[2]])
-            for place, name in enumerate(names)
-            if (match := REPORT_COLUMN.fullmatch(name))
-        }
     numbers: list[list[float]] = []
     for count, row in enumerate(rows[1:], start=1):
         try:
             if len(row) != len(names):
                 raise ValueError(f"it has {len(row)} values, not {len(names)}")
-            numbers.append([unit * float(row[place]) for place, unit in columns.values()])
+            numbers.append([float(cell) for cell in row])
         except ValueError as error:
             raise InputError(f"Row {count} of {path}: {error}.") from error
-    return {name: [row[number] for row in numbers] for number, name in enumerate(columns)}
+    return {name: [row[number] for row in numbers] for number, name in enumerate(names)}
 
 
 def _motion(path: Path, columns: Mapping[str, list[float]], robot: Robot) -> RecordedMotion:
