@@ -43,7 +43,7 @@ async def test_error_while_goals_continue_ends_the_connection(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     hub, line = Hub(time.monotonic), SilentLine()
-    publications = Publications(hub, lambda: "")
+    publications = Publications(hub, "")
     channel = RosChannel(hub, line, Budgets(hub.clock).of("a"), publications)
     client = hub.join(Identity("session", "A client", Role.OPERATOR), "a", channel.notify)
 

@@ -53,7 +53,9 @@ async def test_topics_describe_the_arm_as_it_is(client: RosClient, robot: Robot)
         T = step @ T
     T_base_shoulder = robot.require_arm().T_base_shoulder
     assert T_base_shoulder @ np.array(at_home["T"]) == pytest.approx(T, abs=1e-9)
-    assert f'<robot name="{robot.name}">' in latest["/robot_description"]["data"]
+    description = latest["/robot_description"]["data"]
+    assert f'<robot name="{robot.name}">' in description
+    assert description.count('filename="package://katana450_description/meshes/') > 50
 
 
 async def test_topics_services_and_actions_are_listed(server: AppServer) -> None:

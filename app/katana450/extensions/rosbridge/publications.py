@@ -33,10 +33,10 @@ PERIODS: Mapping[str, float] = {
 
 
 class Publications(NamedTuple):
-    """The topics of one server. ``description`` returns the text of /robot_description."""
+    """The topics of one server. ``description``: the text of /robot_description."""
 
     hub: Hub
-    description: Callable[[], str]
+    description: str
 
     def message(self, topic: str) -> Fields | None:
         """Return the present message of ``topic``; None while there is none.
@@ -46,7 +46,7 @@ class Publications(NamedTuple):
         arm = self.hub.present()
         match topic:
             case protocol.ROBOT_DESCRIPTION:
-                return {"data": self.description()}
+                return {"data": self.description}
             case protocol.DIAGNOSTICS:
                 return diagnostics(self.hub)
             case protocol.TF_STATIC:
