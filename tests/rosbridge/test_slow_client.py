@@ -28,7 +28,7 @@ MAX_KB = 1000
 MAX_LOST = 6
 """Ticks of the 300 that are looked at that a busy machine may delay."""
 
-TOPICS = ("/joint_states", "/tf", "/katana450/state", "/robot_description", "/diagnostics")
+TOPICS = ("/joint_states", "/tf", "/katana450/state", "/robot_description")
 
 
 def memory(process: int) -> int:

@@ -21,7 +21,6 @@ JOINT_STATES: Final = "/joint_states"
 TF: Final = "/tf"
 TF_STATIC: Final = "/tf_static"
 ROBOT_DESCRIPTION: Final = "/robot_description"
-DIAGNOSTICS: Final = "/diagnostics"
 STATE: Final = "/katana450/state"
 
 PUBLISHED: Final = {
@@ -29,7 +28,6 @@ PUBLISHED: Final = {
     TF: "tf2_msgs/msg/TFMessage",
     TF_STATIC: "tf2_msgs/msg/TFMessage",
     ROBOT_DESCRIPTION: "std_msgs/msg/String",
-    DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
     STATE: "std_msgs/msg/String",
 }
 """Topics that clients can subscribe to."""

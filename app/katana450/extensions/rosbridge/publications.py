@@ -20,13 +20,9 @@ from katana450.server.service.hub import Hub
 SILENT_AFTER = 0.3
 """[s] Age at which the state counts as unknown, and topics of the arm are no longer sent."""
 
-OK, WARN, ERROR, STALE = 0, 1, 2, 3
-"""Levels of a diagnostic_msgs/DiagnosticStatus."""
-
 PERIODS: Mapping[str, float] = {
     protocol.JOINT_STATES: 0.02,
     protocol.TF: 1.0 / 30.0,
-    protocol.DIAGNOSTICS: 1.0,
     protocol.STATE: 0.1,
 }
 """[s] Interval of each topic. A topic without one is sent once, to each new subscriber."""
@@ -47,8 +43,8 @@ class Publications(NamedTuple):
         match topic:
             case protocol.ROBOT_DESCRIPTION:
                 return {"data": self.description}
-            case protocol.DIAGNOSTICS:
-                return diagnostics(self.hub)
+            case protocol.STATE:
+                return {"data": answers.encoded(serialize.state(self.hub))}
             case protocol.TF_STATIC:
                 return transforms(arm, time_of(time.time()), moving=False)
         if arm.age > SILENT_AFTER:
@@ -57,12 +53,9 @@ class Publications(NamedTuple):
         # An arm at rest has its state now.
         age = max(self.hub.clock() - arm.state.t, 0.0) if arm.state.moving else 0.0
         stamp = time_of(now - age)
-        match topic:
-            case protocol.JOINT_STATES:
-                return joint_state(arm, stamp)
-            case protocol.TF:
-                return transforms(arm, stamp, moving=True)
-        return {"data": answers.encoded(serialize.state(self.hub))}
+        if topic == protocol.TF:
+            return transforms(arm, stamp, moving=True)
+        return joint_state(arm, stamp)
 
 
 def joint_state(arm: ArmHandle, stamp: Time) -> Fields:
@@ -110,45 +103,11 @@ def transforms(arm: ArmHandle, stamp: Time, *, moving: bool) -> Fields:
     return {"transforms": poses}
 
 
-def diagnostics(hub: Hub) -> Fields:
-    """Return the condition of the arm."""
-    header = Header(stamp=time_of(time.time()))
-    return {"header": header, "status": [_arm_status(serialize.state(hub))]}
-
-
-def _arm_status(now: answers.State) -> Fields:
-    if now.age > SILENT_AFTER:
-        level, message = STALE, f"The arm's process has not answered for {now.age:.1f} s."
-    elif now.stopped is not None:
-        level, message = ERROR, now.stopped
-    elif now.status == "fault":
-        level, message = ERROR, now.why
-    elif now.status == "ok":
-        level, message = OK, "ok"
-    else:
-        level, message = WARN, now.why or now.status
-    values = {"status": now.status, "stop": now.stop or "", "speed": f"{now.speed:g}"}
-    for number, finding in enumerate(now.findings, 1):
-        values[f"finding {number}"] = finding.text
-    if now.arm is not None:
-        values |= {"mode": now.arm.mode, "note": now.arm.note}
-    return {
-        "level": level,
-        "name": "katana450: arm",
-        "message": message,
-        "hardware_id": "katana450",
-        "values": [{"key": key, "value": value} for key, value in values.items()],
-    }
-
-
 MAX_SUBSCRIPTIONS = 16
 """Maximum number of subscriptions of one client to one topic."""
 
 RETRY_SECONDS = 0.1
 """[s] Time after which a topic that had no message is tried again."""
-
-URGENT = (protocol.STATE, protocol.DIAGNOSTICS)
-"""Topics that are due at once when a stop begins, is confirmed or is cleared."""
 
 
 class Subscriptions:
@@ -196,9 +155,9 @@ class Subscriptions:
             self._due.pop(topic, None)
 
     def hurry(self) -> None:
-        """Make the topics that report a stop due."""
+        """Make the state due, as when a stop begins, is confirmed or is cleared."""
         for topic in self._due:
-            if protocol.resolved(topic) in URGENT:
+            if protocol.resolved(topic) == protocol.STATE:
                 self._due[topic] = self._clock()
 
     def next_due(self) -> tuple[str | None, float | None]:
