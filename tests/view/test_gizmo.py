@@ -12,8 +12,17 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.commands.commands import EndDrag, Orient, Turn, TurnElbow
+from katana450.arm.control.commands.commands import (
+    Command,
+    EndDrag,
+    Orient,
+    Position,
+    Turn,
+    TurnElbow,
+)
+from katana450.arm.control.lease import Actor
 from katana450.assembly.robot_session import find_robot
+from katana450.errors import LateError
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.motion.arm_angle import elbow_points
@@ -41,6 +50,17 @@ class Drag:
     client_id: int = 1
 
 
+class LateGestures(RecordedGestures):
+    """Gestures that are refused while they are late."""
+
+    late = False
+
+    def submit(self, command: Command, actor: Actor) -> int:
+        if self.late:
+            raise LateError("late")
+        return super().submit(command, actor)
+
+
 def test_handle_has_the_size_of_the_robot(server: viser.ViserServer) -> None:
     robot, session, _ = find_robot(Settings(), URDF_PATH, None)
     arm, state = robot.require_arm(), session.begin(session.ready, 0.0, 0.0)
@@ -48,6 +68,23 @@ def test_handle_has_the_size_of_the_robot(server: viser.ViserServer) -> None:
         gizmo = Gizmo(server, arm, RecordedGestures(), lambda: state, scale)
         assert gizmo._move.scale == pytest.approx(length)
         assert gizmo._rings["roll"].scale == pytest.approx(RING_RATIO * length)
+
+
+def test_end_of_a_drag_repeats_a_sample_that_was_refused(server: viser.ViserServer) -> None:
+    robot, session, _ = find_robot(Settings(), URDF_PATH, None)
+    state, gestures = session.begin(session.ready, 0.0, 0.0), LateGestures()
+    gizmo = Gizmo(server, robot.require_arm(), gestures, lambda: state)
+    for phase, place, late in (
+        ("start", 0.0, False),
+        ("update", 0.1, False),
+        ("update", 0.2, True),
+    ):
+        gestures.late = late
+        gizmo._move.position = (place, 0.0, 0.0)
+        asyncio.run(gizmo._moved(Drag(gizmo._move, phase)))  # type: ignore[arg-type]
+    gestures.late = False
+    asyncio.run(gizmo._moved(Drag(gizmo._move, "end")))  # type: ignore[arg-type]
+    assert [type(command) for command in gestures.commands] == [Position, Position, EndDrag]
 
 
 @pytest.mark.parametrize("name", RINGS)

@@ -257,13 +257,16 @@ class Gizmo:
         """Submit ``command`` of a drag to ``place``, and the end of the drag."""
         # A hand that lets go without a motion gives no new target: the arm may have another one.
         again = event.phase == "end" and place == self._sent
-        self._sent = () if event.phase == "end" else place
+        self._sent = ()
         # A drag sends 20 messages a second: the next one repeats the request or shows the refusal.
         with suppress(KatanaError):
             if not again:
                 self._gestures.submit(command, actor)
             if event.phase == "end":
                 self._gestures.submit(EndDrag(), actor)
+            else:
+                # A sample that is refused because it is late is repeated at the end.
+                self._sent = place
 
     def _holds(self, part: str) -> bool:
         actor = self._held.get(part)
