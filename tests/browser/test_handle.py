@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -66,6 +67,53 @@ def test_label_says_how_near_the_nearest_part_is(
             lambda: f"\n{distance:.1f} mm to the table" in label(page), f"{distance:.1f} mm"
         )
         page.keep(artefacts / "handle-near.png")
+
+
+def test_control_snaps_and_shift_slows_a_drag(page: ViserPage, truth: Truth) -> None:
+    def height() -> float:
+        truth.wait(20.0, moving=False)
+        return float(truth.status()["T"][2][3])
+
+    def pitch() -> float:
+        truth.wait(20.0, moving=False)
+        return float(truth.status()["pitch"])
+
+    start, keyboard = height(), page.page.keyboard
+    drawn = page.node_pose(MOVE)[2, 3]
+    with page.grip_arrow(MOVE, "z") as grip:
+        keyboard.down("Control")
+        grip.sweep(0.037, 6)
+        page.wait_until(lambda: label(page) == "z +40.0 mm", "the step")
+    keyboard.up("Control")
+    assert height() - start == pytest.approx(0.04, abs=1e-6)
+    assert page.node_pose(MOVE)[2, 3] - drawn == pytest.approx(0.04, abs=1e-6)
+    start = height()
+    with page.grip_arrow(MOVE, "z") as grip:
+        grip.sweep(0.02, 3)
+        keyboard.down("Shift")
+        grip.sweep(-0.03, 6)
+        page.wait_until(lambda: label(page).startswith("z +1"), "the fine way")
+        assert number(label(page)) == pytest.approx(10.0, abs=PIXEL)
+        drawn = page.node_pose(MOVE)[2, 3]
+    keyboard.up("Shift")
+    assert height() - start == pytest.approx(0.01, abs=1e-3 * PIXEL)
+    page.wait_drawn()
+    assert page.node_pose(MOVE)[2, 3] == pytest.approx(drawn, abs=1e-4)
+    start = pitch()
+    with page.grip_ring(PITCH, "y") as grip:
+        keyboard.down("Control")
+        grip.sweep(-0.3, 6)
+        page.wait_until(lambda: label(page) == "pitch −15.0°", "the step")
+    keyboard.up("Control")
+    assert pitch() - start == pytest.approx(math.radians(-15.0), abs=1e-5)
+    start = pitch()
+    with page.grip_ring(PITCH, "y") as grip:
+        keyboard.down("Shift")
+        grip.sweep(0.3, 12)
+        page.wait_until(lambda: label(page).startswith("pitch +"), "the fine turn")
+        assert number(label(page)) == pytest.approx(3.4, abs=0.8)
+    keyboard.up("Shift")
+    assert pitch() - start == pytest.approx(0.06, abs=0.014)
 
 
 @pytest.mark.long
