@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.errors import InputError
 from katana450.extensions.programs.steps.pouring import spill_tilt
 from katana450.maths.water.cylinder import Cylinder
 from tests.geometry.strategies import repeatable
@@ -159,11 +158,3 @@ def test_spilling_begins_where_the_capacity_ends(c: Cylinder, fraction: float) -
     tilt = spill_tilt(c, volume)
     assert c.holds(tilt) == pytest.approx(volume, rel=1e-9)
     assert c.margin(tilt, c.level(tilt, volume)) == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
-def test_invalid_sizes_are_refused(bad: float) -> None:
-    with pytest.raises(InputError, match="radius"):
-        Cylinder(bad, 0.1)
-    with pytest.raises(InputError, match="depth"):
-        Cylinder(0.1, bad)

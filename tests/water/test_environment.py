@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from katana450.arm.robot.props import BASIN_AT, load_props, water_environment
-from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import Basin, WaterEnvironment
 from katana450.maths.water.flow import VesselMove, Water, WaterFlow
@@ -53,13 +52,6 @@ def test_nearly_straight_basin_fills_like_a_straight_one(environment: WaterEnvir
     straight = replace(environment.basin, rim_radius=environment.basin.floor_radius)
     nearly_straight = replace(straight, rim_radius=straight.floor_radius * (1.0 + 1e-12))
     assert nearly_straight.level(2e-4) == pytest.approx(straight.level(2e-4), rel=1e-10)
-
-
-def test_basin_without_finite_size_and_place_is_refused(environment: WaterEnvironment) -> None:
-    with pytest.raises(InputError, match="depth"):
-        replace(environment.basin, depth=math.nan)
-    with pytest.raises(InputError, match="stands at"):
-        replace(environment.basin, at=(0.2, math.inf, 0.0))
 
 
 ENVIRONMENT = water_environment(load_props())

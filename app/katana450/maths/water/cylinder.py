@@ -18,7 +18,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from katana450.errors import InputError
 from katana450.tolerances import ROUNDING
 
 ROUNDS = 100
@@ -34,19 +33,10 @@ class Arcs(NamedTuple):
 
 @dataclass(frozen=True)
 class Cylinder:
-    """The inside of a cylinder: radius and depth [m].
-
-    Raises InputError unless both are positive numbers.
-    """
+    """The inside of a cylinder: radius and depth [m], above 0."""
 
     radius: float
     depth: float
-
-    def __post_init__(self) -> None:
-        for name in ("radius", "depth"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise InputError(f"The cylinder's {name} is {value}; give metres above 0.")
 
     @property
     def capacity(self) -> float:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from katana450.errors import InputError
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.vectors import Vector
 
@@ -63,14 +62,6 @@ class Basin:
     depth: float
     outer_radius: float
     mass: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in ("floor_radius", "rim_radius", "depth", "outer_radius"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise InputError(f"The basin's {name} is {value}; give metres above 0.")
-        if not all(map(math.isfinite, (*self.at, self.floor))):
-            raise InputError(f"The basin stands at {self.at}; give three finite numbers in metres.")
 
     @property
     def capacity(self) -> float:

@@ -9,16 +9,15 @@ constant.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
-from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.environment import Cup, WaterEnvironment
 from katana450.maths.water.parcel import Ground, Parcel, Puddle, landing, spill
@@ -212,8 +211,8 @@ class VesselMove(NamedTuple):
         acceleration: (3,) of the middle of the vessel in the base frame [m/s^2].
     """
 
-    T: npt.ArrayLike
-    acceleration: npt.ArrayLike = (0.0, 0.0, 0.0)
+    T: FloatArray
+    acceleration: Iterable[float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -239,10 +238,10 @@ class WaterFlow:
         self.water_environment = water_environment
         self._basin_holds = counted(water_environment.basin.capacity)
 
-    def begin(self, volume: float, T_base_cup: npt.ArrayLike) -> Water:
+    def begin(self, volume: float, T_base_cup: FloatArray) -> Water:
         """Return ``volume`` [m^3] at rest in the cup, and none elsewhere.
 
-        Raises InputError when the upright cup does not hold it, or the pose is invalid.
+        Raises InputError when the upright cup does not hold it.
         """
         if not 0.0 <= volume <= self.water_environment.cup.inside.capacity:
             maximum = self.water_environment.cup.inside.capacity * 1e6
@@ -251,26 +250,19 @@ class WaterFlow:
             )
         return Water((self.rest("cup", counted(volume), T_base_cup),))
 
-    def rest(self, name: str, volume: int, T_base_vessel: npt.ArrayLike) -> VesselWater:
-        """Return ``volume`` [fl] at rest in a vessel. Raises InputError for an invalid pose."""
-        T = frozen(se3.validated(T_base_vessel, f"The pose of the {name}"))
-        water = VesselWater(name, volume, T)
+    def rest(self, name: str, volume: int, T_base_vessel: FloatArray) -> VesselWater:
+        """Return ``volume`` [fl] at rest in a vessel."""
+        water = VesselWater(name, volume, frozen(T_base_vessel))
         return replace(water, wetted=self._wetted(water))
 
     def step(self, water: Water, moves: Mapping[str, VesselMove], dt: float) -> Water:
         """Return the water after ``dt`` [s], with the vessels moved meanwhile.
 
-        ``moves``: the motions by the names of the vessels; others rest. Raises InputError for an
-        invalid pose and for numbers that are not finite.
+        ``moves``: the motions by the names of the vessels; others rest.
         """
-        poses, pulls = [], []
-        for vessel in water.vessels:
-            T, acceleration = moves.get(vessel.name) or VesselMove(vessel.T)
-            poses.append(frozen(se3.validated(T, f"The pose of the {vessel.name}")))
-            what = f"The acceleration of the {vessel.name}"
-            pulls.append(vector(finite_array(acceleration, (3,), what)))
-        if not 0.0 <= dt < math.inf:
-            raise InputError(f"The time step is {dt} s; give 0 or more seconds.")
+        motions = [moves.get(vessel.name) or VesselMove(vessel.T) for vessel in water.vessels]
+        poses = [frozen(motion.T) for motion in motions]
+        pulls = [vector(motion.acceleration) for motion in motions]
         if dt == 0.0:
             moved = [replace(vessel, T=T) for vessel, T in zip(water.vessels, poses, strict=True)]
             return replace(water, vessels=tuple(moved))
