@@ -18,8 +18,8 @@ from ruckig import Ruckig
 from katana450.assembly.robot_session import find_robot
 from katana450.assembly.supervised import SupervisorPipe
 from katana450.assembly.supervisor import (
+    ChildSpec,
     Supervisor,
-    child_spec,
 )
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
@@ -55,7 +55,7 @@ def failing(_supervisor: SupervisorPipe) -> None:
 
 
 def test_failed_start_lists_no_leaks(capfd: pytest.CaptureFixture[str]) -> None:
-    supervisor = Supervisor([child_spec("it", "It", failing, 5.0)], threading.Event())
+    supervisor = Supervisor([ChildSpec("it", "It", failing, 5.0)], threading.Event())
     supervisor.start()
     supervisor._children["it"].process.join(180.0)
     supervisor.stop()
@@ -79,7 +79,7 @@ def ended_amid_work(_supervisor: SupervisorPipe) -> None:
 
 
 def test_end_amid_work_of_a_thread_lists_no_leaks(capfd: pytest.CaptureFixture[str]) -> None:
-    supervisor = Supervisor([child_spec("it", "It", ended_amid_work, 5.0)], threading.Event())
+    supervisor = Supervisor([ChildSpec("it", "It", ended_amid_work, 5.0)], threading.Event())
     supervisor.start()
     process = supervisor._children["it"].process
     process.join(180.0)

@@ -22,8 +22,6 @@ from katana450.assembly.supervisor import (
     Child,
     ChildSpec,
     Supervisor,
-    Work,
-    child_spec,
 )
 from katana450.errors import ConfigurationError
 from tests.waiting import until
@@ -103,8 +101,8 @@ class Running:
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_lost_process_starts_again_with_its_state(tmp_path: Path, number: signal.Signals) -> None:
     running = Running(
-        child_spec("worker", "The worker", partial(worker, tmp_path), 1.0, keeps=True),
-        child_spec("idler", "The idler", partial(idler, tmp_path), 1.0),
+        ChildSpec("worker", "The worker", partial(worker, tmp_path), 1.0, keeps=True),
+        ChildSpec("idler", "The idler", partial(idler, tmp_path), 1.0),
     )
     try:
         until((tmp_path / "pid0").exists)
@@ -122,7 +120,7 @@ def test_lost_process_starts_again_with_its_state(tmp_path: Path, number: signal
 
 
 def test_process_without_heartbeats_is_ended(tmp_path: Path) -> None:
-    running = Running(child_spec("stubborn", "It", partial(stubborn, tmp_path), 0.5))
+    running = Running(ChildSpec("stubborn", "It", partial(stubborn, tmp_path), 0.5))
     try:
         until(lambda: len((tmp_path / "started").read_text()) >= 2)
     finally:
@@ -132,7 +130,7 @@ def test_process_without_heartbeats_is_ended(tmp_path: Path) -> None:
 def test_error_in_any_thread_ends_the_process(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    running = Running(child_spec("careless", "It", partial(careless, tmp_path), 5.0))
+    running = Running(ChildSpec("careless", "It", partial(careless, tmp_path), 5.0))
     (tmp_path / "started").touch()
     (tmp_path / "running").touch()
     try:
@@ -149,7 +147,7 @@ def test_error_of_the_first_start_ends_the_server(
     tmp_path: Path, work: Callable[[Path, SupervisorPipe], None], message: str
 ) -> None:
     supervisor = Supervisor(
-        [child_spec("it", "It", partial(work, tmp_path), 1.0)], threading.Event()
+        [ChildSpec("it", "It", partial(work, tmp_path), 1.0)], threading.Event()
     )
     supervisor.start()
     with pytest.raises(ConfigurationError, match=message):
@@ -158,7 +156,7 @@ def test_error_of_the_first_start_ends_the_server(
 
 
 def test_hang_at_the_first_start_ends_the_server_with_its_reason(tmp_path: Path) -> None:
-    spec = child_spec("stubborn", "It", partial(stubborn, tmp_path), 0.5)
+    spec = ChildSpec("stubborn", "It", partial(stubborn, tmp_path), 0.5)
     supervisor = Supervisor([spec], threading.Event())
     supervisor.start()
     with pytest.raises(ConfigurationError, match="did not start: it has not answered for"):
@@ -166,15 +164,20 @@ def test_hang_at_the_first_start_ends_the_server_with_its_reason(tmp_path: Path)
     supervisor.stop()
 
 
-def test_supervisor_ends_although_a_process_could_not_be_started(tmp_path: Path) -> None:
+class Unstartable:
+    """The function of a process that the system refuses to start."""
 
-    def work(_kept: object) -> Work:
+    def __call__(self, _supervisor: SupervisorPipe) -> None: ...
+
+    def __reduce__(self) -> str:
         raise OSError("no more processes")
 
+
+def test_supervisor_ends_although_a_process_could_not_be_started(tmp_path: Path) -> None:
     specs = [
-        child_spec("idler", "The idler", partial(idler, tmp_path), 1.0),
-        ChildSpec("it", "It", work, 1.0),
-        child_spec("later", "The later one", partial(idler, tmp_path), 1.0),
+        ChildSpec("idler", "The idler", partial(idler, tmp_path), 1.0),
+        ChildSpec("it", "It", Unstartable(), 1.0),
+        ChildSpec("later", "The later one", partial(idler, tmp_path), 1.0),
     ]
     supervisor = Supervisor(specs, threading.Event())
     with pytest.raises(OSError, match="no more"):
@@ -185,7 +188,7 @@ def test_supervisor_ends_although_a_process_could_not_be_started(tmp_path: Path)
 def test_excused_time_ends_now(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr(supervisor_module, "time", SimpleNamespace(monotonic=lambda: now))
-    child = Child(child_spec("it", "It", partial(idler, tmp_path), 1.0))
+    child = Child(ChildSpec("it", "It", partial(idler, tmp_path), 1.0))
     # More than the time since the last message, as when one has just been read.
     child.excuse(2 * now)
     assert child.hangs is None

@@ -31,7 +31,6 @@ from katana450.assembly.supervised import (
     REPORT,
     ROBOT,
     SCENE,
-    SupervisorPipe,
     run_supervised,
 )
 from katana450.errors import ConfigurationError, KatanaError
@@ -76,8 +75,6 @@ log = logging.getLogger(__name__)
 Kept = dict[bytes, bytes]
 """The last known state of the arm, by the kinds KEPT and SCENE, which is not read here."""
 
-Work = Callable[[SupervisorPipe], None]
-
 
 @dataclass(frozen=True)
 class ChildSpec:
@@ -86,15 +83,18 @@ class ChildSpec:
     Attributes:
         name: name of the process, of up to 15 letters.
         title: its name for people, at the beginning of a sentence.
-        work: returns its function; None as its argument at the first start, later the kept state.
+        function: its function, called with its ``SupervisorPipe``.
         deadline: silence [s] after which the process is ended, once it is ready.
+        keeps: whether the function takes first the state that an earlier process has sent; None at
+            the first start.
         late: whether it is started after all others are ready.
     """
 
     name: str
     title: str
-    work: Callable[[Kept | None], Work]
+    function: Callable[..., None]
     deadline: float
+    keeps: bool = False
     late: bool = False
 
     @property
@@ -128,10 +128,13 @@ class Child:
         ends: Any = spawn.Pipe()
         self._pipe: Connection
         self._pipe, theirs = ends
-        content = None if self._first else self.kept if self._early_ends <= MAX_KEPT_STARTS else {}
+        work = self.spec.function
+        if self.spec.keeps:
+            state = self.kept if self._early_ends <= MAX_KEPT_STARTS else {}
+            work = partial(work, None if self._first else state)
         self.process = spawn.Process(
             target=run_supervised,
-            args=(self.spec.name, self.spec.work(content), theirs, self.spec.heartbeat_interval),
+            args=(self.spec.name, work, theirs, self.spec.heartbeat_interval),
             name=self.spec.name,
             daemon=True,
         )
@@ -329,15 +332,3 @@ class Supervisor:
         for child in self._children.values():
             if child is not about and child.due is None:
                 child.send(NOTICE + text.encode())
-
-
-def child_spec(
-    name: str, title: str, function: Callable[..., None], deadline: float, *, keeps: bool = False
-) -> ChildSpec:
-    """Return the specification of a process that runs ``function(supervisor)``.
-
-    keeps: whether the function takes the kept state too: ``function(kept, supervisor)``.
-    """
-    return ChildSpec(
-        name, title, lambda content: partial(function, content) if keeps else function, deadline
-    )

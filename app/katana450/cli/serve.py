@@ -21,7 +21,7 @@ from katana450.arm.runtime.pipes.private_listener import PrivateAddress
 from katana450.assembly.frontend_process import OPEN, Sockets, log_folder, run_frontend
 from katana450.assembly.log_output import say, start_log
 from katana450.assembly.supervised import READY
-from katana450.assembly.supervisor import Supervisor, child_spec
+from katana450.assembly.supervisor import ChildSpec, Supervisor
 from katana450.errors import ConfigurationError, KatanaError
 from katana450.extension import ExtraProcess, ServerFacts, load, results
 from katana450.platform_support import pipe_address, stop_signals
@@ -131,19 +131,17 @@ class _Server:
         stop = partial(_run, RUN_STOP, facts, self.stopping_socket)
         extra: list[ExtraProcess] = [*results("process", options, facts)]
         specs = (
-            child_spec(STOP, "The process of STOP", stop, STOP_DEADLINE),
-            child_spec(FRONT_END, "The page's server", front_end, FRONT_END_DEADLINE),
-            child_spec(
+            ChildSpec(STOP, "The process of STOP", stop, STOP_DEADLINE),
+            ChildSpec(FRONT_END, "The page's server", front_end, FRONT_END_DEADLINE),
+            ChildSpec(
                 ARM, "The arm's process", partial(_run, RUN_ARM, facts), ARM_DEADLINE, keeps=True
             ),
             *(
-                replace(
-                    child_spec(
-                        process.name,
-                        process.title,
-                        partial(process.run, process.config),
-                        EXTRA_DEADLINE,
-                    ),
+                ChildSpec(
+                    process.name,
+                    process.title,
+                    partial(process.run, process.config),
+                    EXTRA_DEADLINE,
                     late=True,
                 )
                 for process in extra
