@@ -88,7 +88,7 @@ def _unpacked(html: str) -> tuple[str, str, Mapping[str, File]]:
     style, program = both[:style_size].decode(), both[style_size:]
     wasm = gzip.decompress(_bytes(decoder[1].replace("\\\\", "\\")))
     files = {
-        PROGRAM: File.of(program, "text/javascript; charset=utf-8", zstd=True),
+        PROGRAM: File.of(program, "text/javascript; charset=utf-8"),
         DECODER_FILE: File.of(wasm, "application/wasm"),
     }
     head, rest = html[: loader.start()], html[loader.end() :]

@@ -8,7 +8,6 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import zstandard
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -20,9 +19,6 @@ TYPES = {
     ".js": "text/javascript; charset=utf-8",
     ".svg": "image/svg+xml",
 }
-
-ZSTD_LEVEL = 19
-"""Level of compression by zstd."""
 
 COMMENT = re.compile(
     rb"""^[ \t]*(?://.*|/\*\*(?:[^*]|\*(?!/))*\*/)$|(?<=[;,{]) // [^"'`\n]*$""", re.MULTILINE
@@ -39,21 +35,18 @@ class File:
         packed: content compressed by gzip.
         media_type: type of its content.
         tag: ETag.
-        zstd: content compressed by zstd, a fifth smaller and slow to make; None without.
     """
 
     content: bytes
     packed: bytes
     media_type: str
     tag: str
-    zstd: bytes | None = None
 
     @classmethod
-    def of(cls, content: bytes, media_type: str, *, zstd: bool = False) -> File:
-        """Return the file with ``content``. ``zstd``: whether it is compressed by zstd too."""
+    def of(cls, content: bytes, media_type: str) -> File:
+        """Return the file with ``content``."""
         tag = f'"{hashlib.sha256(content).hexdigest()[:20]}"'
-        packed = zstandard.compress(content, ZSTD_LEVEL) if zstd else None
-        return cls(content, gzip.compress(content, mtime=0), media_type, tag, packed)
+        return cls(content, gzip.compress(content, mtime=0), media_type, tag)
 
     def answer(self, request: Request, policy: str | None = None) -> Response:
         """Return the response to ``request``: 304 if the browser already has the content."""
@@ -62,11 +55,7 @@ class File:
             headers["Content-Security-Policy"] = policy
         if self.tag in request.headers.get("if-none-match", ""):
             return Response(status_code=304, headers=headers)
-        accepted = request.headers.get("accept-encoding", "")
-        if self.zstd is not None and "zstd" in accepted:
-            headers["Content-Encoding"] = "zstd"
-            return Response(self.zstd, headers=headers, media_type=self.media_type)
-        if "gzip" in accepted:
+        if "gzip" in request.headers.get("accept-encoding", ""):
             headers["Content-Encoding"] = "gzip"
             return Response(self.packed, headers=headers, media_type=self.media_type)
         return Response(self.content, headers=headers, media_type=self.media_type)
