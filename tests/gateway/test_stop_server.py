@@ -9,6 +9,7 @@ import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 
 import h11
 import pytest
@@ -16,6 +17,7 @@ import pytest
 from katana450.arm.control.lease import Role
 from katana450.arm.control.state.stop_cause import StopCause, pressed
 from katana450.arm.runtime.pipes.stop_messages import NO_STATE, StopPress, StopStatus
+from katana450.arm.runtime.pipes.stop_pipe import StopPipe
 from katana450.server.service import stop_path
 from katana450.server.service.stop_path import StopPath, watch_stop_path
 from katana450.server.web import stop_server
@@ -58,7 +60,8 @@ class Port:
         address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
         authenticator = Authenticator(file, 8080, address)
         self.pipe = FakePipe()
-        self.server = StopServer(self.pipe, authenticator, address, 8080, Acceptor(listening))
+        pipe = cast(StopPipe, self.pipe)
+        self.server = StopServer(pipe, authenticator, address, 8080, Acceptor(listening))
 
     async def stop(self, token: str, press: str = "two") -> tuple[int, str]:
         """Return status and stage of a STOP, which is answered at once."""

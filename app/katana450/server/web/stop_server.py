@@ -16,7 +16,7 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from http import HTTPStatus
-from typing import NamedTuple, Protocol, cast
+from typing import NamedTuple, cast
 from urllib.parse import parse_qs, urlsplit
 
 import h11
@@ -24,7 +24,8 @@ import msgspec
 
 from katana450.arm.control.lease import Actor, CommandChannel, Grounds, Person
 from katana450.arm.control.state.stop_cause import UNNAMED, StopCause, pressed
-from katana450.arm.runtime.pipes.stop_messages import NO_STATE, StopPress, StopStatus
+from katana450.arm.runtime.pipes.stop_messages import NO_STATE, StopPress
+from katana450.arm.runtime.pipes.stop_pipe import StopPipe
 from katana450.errors import InputError
 from katana450.server.api.fields import API, MAX_PRESS_LENGTH, STOP_PATHS
 from katana450.server.api.outcome_answers import Refused
@@ -76,22 +77,6 @@ HEADERS = (
 LINES_HELP = 'Send {"do": "hello", "name": "..."} and {"do": "stop"}, each on a line of its own.'
 
 
-class ArmPipe(Protocol):
-    """The arm as this server sees it; ``StopPipe`` implements it."""
-
-    status: StopStatus | None
-
-    @property
-    def age(self) -> float:
-        """Time since the newest message of the arm's process [s]."""
-
-    def press(self, press: StopPress) -> None:
-        """Send ``press`` to the arm's process."""
-
-    async def executed(self, press: str, timeout: float) -> StopCause | None:
-        """Return the cause of the stop once a state includes ``press``; None after ``timeout``."""
-
-
 class Reply(NamedTuple):
     """Response to a request."""
 
@@ -114,7 +99,7 @@ class StopServer:
 
     def __init__(
         self,
-        pipe: ArmPipe,
+        pipe: StopPipe,
         authenticator: Authenticator,
         address: Address,
         main_port: int,
