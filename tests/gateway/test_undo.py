@@ -79,7 +79,7 @@ def test_removed_object_returns_and_new_one_goes(program: Client) -> None:
     assert names(program) == before
 
 
-def test_look_and_place_of_an_object_are_undone_one_by_one(program: Client) -> None:
+def test_look_and_place_of_an_object_are_undone(program: Client) -> None:
     def basin() -> answers.SceneObject:
         objects = program.query(answers.Objects).objects
         return next(item for item in objects if item.name == "basin")
@@ -95,9 +95,7 @@ def test_look_and_place_of_an_object_are_undone_one_by_one(program: Client) -> N
     changed = basin()
     assert (changed.colour, changed.opacity, changed.hidden) == ("#204060", 0.5, True)
     np.testing.assert_allclose(changed.T, T, atol=1e-9)
-    program.ask(requests.Undo())
-    np.testing.assert_allclose(basin().T, before.T, atol=1e-9)
-    assert (basin().colour, basin().opacity, basin().hidden) == ("#204060", 0.5, True)
+    # All within a second count as one change.
     program.ask(requests.Undo())
     assert basin() == before
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Actor
-from katana450.arm.control.state.scene_objects import SceneObject, named, same
+from katana450.arm.control.state.scene_objects import SceneObject, named
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
@@ -124,12 +124,6 @@ class UndoHistory:
         holds = any(scene_object.held for scene_object in state.objects)
         if isinstance(command, cmd.Gripper) and holds and state.moving:
             raise InputError("The hand holds an object and the arm moves: wait until it rests.")
-        if isinstance(command, cmd.PlaceObject) and now is not None:
-            before = command.scene_object
-            if changes[0].name == _look_of(now.name):
-                command = cmd.PlaceObject(replace(now, appearance=before.appearance))
-            else:
-                command = cmd.PlaceObject(replace(before, appearance=now.appearance))
         return changes[0], command
 
     def move(self, change: Change, back: Change | None, *, redo: bool) -> None:
@@ -166,19 +160,7 @@ def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | No
         return f"object {name}", cmd.Remove(name)
     if before.held:
         return None
-    looks = isinstance(command, cmd.PlaceObject) and _looks_only(before, command.scene_object)
-    return _look_of(name) if looks else f"object {name}", cmd.PlaceObject(before)
-
-
-def _looks_only(before: SceneObject, after: SceneObject) -> bool:
-    """Return whether the appearance, and nothing else, distinguishes ``after`` from ``before``."""
-    alike = same((after,), (replace(before, appearance=after.appearance),))
-    return alike and after.appearance != before.appearance
-
-
-def _look_of(name: str) -> str:
-    """Return the name of a change of colour, opacity or visibility of an object."""
-    return f"look of {name}"
+    return f"object {name}", cmd.PlaceObject(before)
 
 
 def _object_of(command: cmd.Command) -> str | None:
