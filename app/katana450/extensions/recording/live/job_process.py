@@ -21,7 +21,7 @@ import msgspec
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.progress import report, report_to
-from katana450.extensions.recording.datasets.export_command import export
+from katana450.extensions.recording.files.record_command import export
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import session_for, verified
 from katana450.extensions.recording.files.trimming import keep, trim
