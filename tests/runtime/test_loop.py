@@ -24,7 +24,7 @@ from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.tick import TickRecord
 from katana450.assembly.robot_session import find_robot
-from katana450.extensions.recording.live.run_events import RunEvents
+from katana450.extensions.recording.live.ring import RunEvents
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH

@@ -1,4 +1,4 @@
-"""The ring: recordings of the last minutes, in files of about a minute each."""
+"""The ring: recordings of the last minutes, in files of about a minute each, with their events."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.state.findings import entries_between
+from katana450.arm.control.state.modes import Following
 from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.episodes.episode import EpisodeMessage
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.folders import SUFFIX, recordings_in
-from katana450.extensions.recording.live.run_events import RunEvents
 from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.platform_support import create_file
 
@@ -39,6 +40,51 @@ RETRY_SECONDS = 5.0
 """[s] Time after an error of the disk until the next attempt to write."""
 
 log = logging.getLogger(__name__)
+
+STOP, CLEAR_STOP, DRIVER, STEP = "stop", "clear_stop", "driver", "step"
+"""Kinds of these events."""
+
+
+class RunEvents:
+    """Finds the events of one run, tick by tick."""
+
+    def __init__(self) -> None:
+        """Begin before the first tick."""
+        self._before: State | None = None
+        self._driver = ""
+
+    def of(self, record: TickRecord) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Yield kind and fields of each event of ``record``, the tick after the last one."""
+        for command, actor in record.submissions:
+            if actor is None or actor.channel is CommandChannel.SERVER or command.traits.safety:
+                continue
+            if actor.name != self._driver:
+                self._driver = actor.name
+                yield DRIVER, {"name": actor.name, "channel": actor.channel.value}
+        before, self._before = self._before, record.state
+        if before is None:
+            return
+        yield from _stops(before, record.state)
+        was, now = before.following, record.state.following
+        if now is not None and now.fraction < 1.0 and _begins(was, now):
+            # On the clock of the program: at its speed, and without what is done already.
+            seconds = now.plan.duration_at(record.state.speed) * (1.0 - now.fraction)
+            yield STEP, {"seconds": seconds}
+
+
+def _begins(was: Following | None, now: Following) -> bool:
+    """Return whether ``now`` is on another plan than ``was``; a later record has a copy of it."""
+    return was is None or was.plan.span != now.plan.span or now.tau < was.tau
+
+
+def _stops(before: State, after: State) -> Iterator[tuple[str, dict[str, Any]]]:
+    was, now = before.stopped, after.stopped
+    if now is not None and was is None:
+        yield STOP, {"why": now.cause.why, "by": now.cause.by}
+    elif now is not None and was is not None and was.cause.lacks_name_of(now.cause):
+        yield STOP, {"why": now.cause.why, "by": now.cause.by, "named": True}
+    elif now is None and was is not None:
+        yield CLEAR_STOP, {}
 
 
 class Ring:

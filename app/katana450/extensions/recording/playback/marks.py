@@ -10,7 +10,7 @@ from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.extensions.recording.files.recording_file import Message
 from katana450.extensions.recording.forms import FormError, json_form
-from katana450.extensions.recording.live import run_events
+from katana450.extensions.recording.live import ring
 from katana450.extensions.recording.messages import EPISODES
 
 MAX_TEXT = 120
@@ -47,7 +47,7 @@ def add_marks(marks: list[Mark], messages: Iterable[Message]) -> None:
     """
     for mark in _all(messages):
         if mark.kind == NAMED:
-            stops = [number for number, old in enumerate(marks) if old.kind == run_events.STOP]
+            stops = [number for number, old in enumerate(marks) if old.kind == ring.STOP]
             if stops:
                 marks[stops[-1]] = marks[stops[-1]]._replace(text=mark.text)
             continue
@@ -74,15 +74,15 @@ def _all(messages: Iterable[Message]) -> Iterator[Mark]:
 
 def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
     match kind:
-        case run_events.STOP:
+        case ring.STOP:
             return NAMED if form.get("named") else kind, str(form.get("why") or "Stopped")
-        case run_events.CLEAR_STOP:
+        case ring.CLEAR_STOP:
             return kind, "Stop cleared"
-        case run_events.DRIVER if form.get("channel") != CommandChannel.PROGRAM.value:
+        case ring.DRIVER if form.get("channel") != CommandChannel.PROGRAM.value:
             return kind, f"{form.get('name')} drives"
         case "program":
             return _program(form)
-        case run_events.STEP:
+        case ring.STEP:
             seconds = form.get("seconds")
             length = f" of {seconds:.1f} s" if isinstance(seconds, int | float) else ""
             return kind, f"Planned motion{length}"
