@@ -43,8 +43,8 @@ from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.messages import EVENTS
-from katana450.extensions.recording.playback import opened_run
 from katana450.extensions.recording.playback import run as run_module
+from katana450.extensions.recording.playback import store
 from katana450.extensions.recording.playback.marks import Mark, add_marks
 from katana450.extensions.recording.playback.routes import PlaybackRoutes, difference
 from katana450.extensions.recording.playback.rows import still_flying
@@ -180,7 +180,7 @@ def test_file_that_its_process_cannot_decode_is_refused(
     assert after.row == before.row
     if sys.platform != "win32":
         os.kill(run._process.pid, signal.SIGSTOP)
-    monkeypatch.setattr(opened_run, "TIMEOUT", 0.2)
+    monkeypatch.setattr(store, "TIMEOUT", 0.2)
     with pytest.raises(InputError, match=r"could not be decoded within 0\.2 s"):
         run.at(begin)
 

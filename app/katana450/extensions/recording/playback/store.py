@@ -1,18 +1,205 @@
-"""The recordings that a server plays back: its own last minutes, and files that people opened."""
+"""The recordings that a server plays back: its own last minutes, and files that people opened.
+
+A file is decoded in a process of its own, so that it neither stops the page's server for a moment
+nor fills its memory. The process runs this module with the file as its argument. It limits its
+memory before it reads the file, answers requests one after another, and ends with its input. A
+request is a JSON line, ``[method, arguments]``. An answer is a pickle after its length: whether it
+was successful, and the result or the reason.
+"""
 
 from __future__ import annotations
 
+import json
+import pickle
 import secrets
 import shutil
+import struct
+import subprocess
+import sys
+import threading
+import time
 import weakref
 from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from tempfile import mkdtemp
+from typing import Any, BinaryIO
 
 from katana450.errors import InputError
 from katana450.extensions.recording.folders import SUFFIX, recordings_in
-from katana450.extensions.recording.playback.opened_run import OpenedRun
-from katana450.extensions.recording.playback.run import PlaybackRun
+from katana450.extensions.recording.messages import StateRow
+from katana450.extensions.recording.playback.marks import Mark
+from katana450.extensions.recording.playback.rows import RecordedMoment
+from katana450.extensions.recording.playback.run import PlaybackRun, Span
+from katana450.platform_support import limit_resources, without_interrupts
+
+TIMEOUT = 30.0
+"""[s] Timeout of a request to the process."""
+
+WATCH_PERIOD = 0.5
+"""[s] Time between two looks at how long a request takes."""
+
+MAX_ANSWER_BYTES = 64_000_000
+"""Maximum size of an answer; a moment has some kilobytes, and 2 MB with many solids."""
+
+MAX_MEMORY_BYTES = 3_000_000_000
+"""Maximum address space, a part of which libraries only reserve."""
+
+MAX_SECONDS = 3600
+"""[s] Maximum processor time of all requests for one file."""
+
+LENGTH = struct.Struct("<Q")
+"""Length of an answer [bytes]."""
+
+
+class OpenedRun:
+    """The run in one file, with the methods of ``PlaybackRun``. For any thread.
+
+    The process is started with the first request, and again after one that it did not survive.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Read the file at ``path``, which does not change."""
+        self._path = path
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._asked: float | None = None
+        self.spans: tuple[Span, ...] = ()
+        """The times with records; empty before ``update``."""
+        self.metadata: Mapping[str, str] = {}
+        """Texts about the file."""
+
+    def update(self) -> None:
+        """Read the index of the file, once. Raises InputError if it cannot be read."""
+        if not self.spans:
+            self._ask("update")
+            self.spans, self.metadata = self._ask("about")
+
+    def marks(self) -> list[Mark]:
+        """See ``PlaybackRun.marks``."""
+        marks: list[Mark] = self._ask("marks")
+        return marks
+
+    def at(self, t: float) -> RecordedMoment | None:
+        """See ``PlaybackRun.at``."""
+        moment: RecordedMoment | None = self._ask("at", t)
+        return moment
+
+    def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
+        """See ``PlaybackRun.rows_at``."""
+        rows: list[StateRow | None] = self._ask("rows_at", list(times))
+        return rows
+
+    def close(self) -> None:
+        """End the process, without waiting for a request that it works on."""
+        process = self._process
+        if process is not None:
+            process.kill()
+
+    def _ask(self, method: str, *arguments: Any) -> Any:
+        """Return the result of ``method`` in the process. Raises InputError with the reason."""
+        with self._lock:
+            again = self._process is None and method != "update"
+            process = self._started()
+            self._asked = time.monotonic()
+            try:
+                if again:
+                    _request(process, "update", ())
+                successful, result = _request(process, method, arguments)
+            except (OSError, EOFError) as error:
+                self._end()
+                raise InputError(
+                    f"The file could not be decoded within {TIMEOUT:g} s and the memory that one "
+                    "file may take."
+                ) from error
+            finally:
+                self._asked = None
+        if not successful:
+            raise InputError(result)
+        return result
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        if self._process is None:
+            self._process = subprocess.Popen(
+                (sys.executable, "-P", "-m", __spec__.name, str(self._path)),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                **without_interrupts(),
+            )
+            weakref.finalize(self, _end, self._process)
+            # One thread for all requests: to start one for each would take most of their time.
+            watch = (weakref.ref(self), self._process)
+            threading.Thread(target=_watch, args=watch, name="decoder", daemon=True).start()
+        return self._process
+
+    def _end(self) -> None:
+        if self._process is not None:
+            _end(self._process)
+            self._process = None
+
+
+def _watch(reference: weakref.ref[OpenedRun], process: subprocess.Popen[bytes]) -> None:
+    """Kill ``process`` when it hangs, so that the pipe with its answer ends."""
+    while process.poll() is None:
+        time.sleep(WATCH_PERIOD)
+        run = reference()
+        start = None if run is None else run._asked
+        del run
+        if start is not None and time.monotonic() - start > TIMEOUT:
+            process.kill()
+
+
+def _request(process: subprocess.Popen[bytes], method: str, arguments: Sequence[Any]) -> Any:
+    """Return the answer of ``process``. Raises EOFError or OSError if it has ended."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(json.dumps((method, arguments)).encode() + b"\n")
+    process.stdin.flush()
+    head = process.stdout.read(LENGTH.size)
+    length = LENGTH.unpack(head)[0] if len(head) == LENGTH.size else MAX_ANSWER_BYTES + 1
+    if length > MAX_ANSWER_BYTES:
+        raise EOFError
+    content = process.stdout.read(length)
+    if len(content) != length:
+        raise EOFError
+    return pickle.loads(content)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Kill ``process`` and close its pipes."""
+    process.kill()
+    for pipe in (process.stdin, process.stdout):
+        with suppress(OSError):
+            if pipe is not None:
+                pipe.close()
+    process.wait()
+
+
+def answer(run: PlaybackRun, request: bytes) -> bytes:
+    """Return the answer to ``request``, with its length before it."""
+    method, arguments = json.loads(request)
+    try:
+        if method == "about":
+            result: tuple[bool, Any] = True, (run.spans, run.metadata)
+        else:
+            result = True, getattr(run, method)(*arguments)
+    except InputError as error:
+        result = False, str(error)
+    except MemoryError:
+        result = False, "The file needs too much memory."
+    content = pickle.dumps(result, pickle.HIGHEST_PROTOCOL)
+    return LENGTH.pack(len(content)) + content
+
+
+def serve(path: Path, requests: BinaryIO, answers: BinaryIO) -> None:
+    """Answer ``requests`` about the file ``path`` until they end."""
+    run = PlaybackRun(lambda: [path])
+    for request in requests:
+        answers.write(answer(run, request))
+        answers.flush()
+
 
 RING = "ring"
 """Name of the last minutes that the server has recorded itself."""
@@ -85,3 +272,8 @@ def opened(path: Path) -> OpenedRun:
     if not run.spans:
         raise InputError("The file is not a recording of katana450, or has no motion.")
     return run
+
+
+if __name__ == "__main__":
+    limit_resources(MAX_MEMORY_BYTES, MAX_SECONDS)
+    serve(Path(sys.argv[1]), sys.stdin.buffer, sys.stdout.buffer)
