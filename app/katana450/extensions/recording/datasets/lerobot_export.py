@@ -18,13 +18,12 @@ from katana450.errors import InputError
 from katana450.extensions.media.film import VideoEncoder
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.datasets.lerobot_writer import (
-    VIDEO_MB,
+    FIRST_FILE,
     VIDEO_PATH,
     DatasetShape,
     LerobotWriter,
     PixelCounts,
     arrow,
-    place,
 )
 from katana450.extensions.recording.datasets.sampling import (
     RecordedStates,
@@ -46,14 +45,12 @@ CRF = 18
 KEY_PICTURES = 2
 """Every second picture can be decoded alone, so that training may read them in any order."""
 
-MEGABYTE = 2**20
-
 
 class EpisodeVideo:
-    """Writes the pictures of one view."""
+    """Writes the pictures of one view as one film."""
 
     def __init__(self, folder: Path, feature: str, size: tuple[int, int], fps: int) -> None:
-        """Write into the dataset in ``folder``.
+        """Begin the film in the dataset in ``folder``.
 
         Args:
             folder: folder of the dataset.
@@ -61,10 +58,12 @@ class EpisodeVideo:
             size: width and height [px], both even.
             fps: pictures per second.
         """
-        self._folder, self._feature, self._size, self._fps = folder, feature, size, fps
-        self._encoder: VideoEncoder | None = None
-        self._path = folder
-        self._file = -1
+        self._feature, self._fps = feature, fps
+        path = folder / VIDEO_PATH.format(video_key=feature, **FIRST_FILE)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Pictures that refer to later ones would not begin at time 0.
+        options = ("-crf", str(CRF), "-g", str(KEY_PICTURES), "-bf", "0")
+        self._encoder = VideoEncoder(path, size, fps, *options)
         self._written = self._begin = 0
         self.counts = PixelCounts()
         """Pixels of all episodes that have ended."""
@@ -72,50 +71,30 @@ class EpisodeVideo:
 
     def add(self, picture: npt.NDArray[np.uint8]) -> None:
         """Add the next ``picture`` (height, width, 3) of the present episode."""
-        if self._encoder is None:
-            self._encoder = self._open()
         self._encoder.add(picture)
         self._episode.add(picture)
         self._written += 1
 
     def end_episode(self) -> tuple[dict[str, Any], dict[str, list[Any]]]:
         """End an episode; return where it is, as columns of its row, and its statistics."""
-        chunk, file = place(self._file)
         named = f"videos/{self._feature}"
         row = {
-            f"{named}/chunk_index": chunk,
-            f"{named}/file_index": file,
+            **{f"{named}/{index}": number for index, number in FIRST_FILE.items()},
             f"{named}/from_timestamp": self._begin / self._fps,
             f"{named}/to_timestamp": self._written / self._fps,
         }
         statistics = self._episode.statistics
         self.counts.merge(self._episode)
         self._episode, self._begin = PixelCounts(), self._written
-        if self._path.is_file() and self._path.stat().st_size > VIDEO_MB * MEGABYTE:
-            self.finish()
         return row, statistics
 
     def finish(self) -> None:
-        """Complete the present file. Raises OSError if that fails, as on a full disk."""
-        if self._encoder is not None:
-            self._encoder.finish()
-            self._encoder = None
+        """Complete the film. Raises OSError if that fails, as on a full disk."""
+        self._encoder.finish()
 
     def abandon(self) -> None:
         """End the encoder, whatever it has written."""
-        if self._encoder is not None:
-            self._encoder.abandon()
-
-    def _open(self) -> VideoEncoder:
-        self._file += 1
-        chunk, file = place(self._file)
-        name = VIDEO_PATH.format(video_key=self._feature, chunk_index=chunk, file_index=file)
-        self._path = self._folder / name
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        self._written = self._begin = 0
-        # Pictures that refer to later ones would not begin at time 0.
-        options = ("-crf", str(CRF), "-g", str(KEY_PICTURES), "-bf", "0")
-        return VideoEncoder(self._path, self._size, self._fps, *options)
+        self._encoder.abandon()
 
 
 DEFAULT_OUTCOMES = tuple(outcome.value for outcome in JUDGED)
@@ -319,12 +298,10 @@ def export_lerobot(
         folder = stack.enter_context(new_folder(out))
         writer = LerobotWriter(folder, shape)
         stack.callback(writer.close)
-        videos = [
-            EpisodeVideo(folder, feature, options.size, options.fps)
-            for feature in shape.videos.values()
-        ]
-        for video in videos:
-            stack.callback(video.abandon)
+        videos: list[EpisodeVideo] = []
+        for feature in shape.videos.values():
+            videos.append(EpisodeVideo(folder, feature, options.size, options.fps))
+            stack.callback(videos[-1].abandon)
         episodes: Iterator[_Episode] = (_sampled_episode(cut, options.fps) for cut in cuts)
         pictures: Iterator[tuple[Pixels, ...]] = repeat(())
         if cameras is None or session is None:

@@ -96,10 +96,13 @@ VERSION: Final = "v3.0"
 """Version of the form."""
 
 CHUNK_FILES = 1000
-"""Maximum number of files in a folder."""
-
 DATA_MB, VIDEO_MB = 100, 200
-"""[MB] Size of a file of rows or pictures after which the next episode begins a new one."""
+"""Maximum number of files in a folder, and size [MB] after which programs that add episodes begin a
+new file of rows or pictures. Here all rows are in one file, and the pictures of a view in one film.
+"""
+
+FIRST_FILE = {"chunk_index": 0, "file_index": 0}
+"""Numbers of the only file."""
 
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
@@ -204,11 +207,6 @@ def _scalar(kind: str) -> dict[str, Any]:
     return {"dtype": kind, "shape": [1], "names": None}
 
 
-def place(number: int) -> tuple[int, int]:
-    """Return the numbers of folder and file of the file with ``number``, from 0."""
-    return divmod(number, CHUNK_FILES)
-
-
 def pandas_metadata(index: str, columns: Sequence[str]) -> bytes:
     """Return the metadata by which pandas reads the text column ``index`` as the index.
 
@@ -247,7 +245,6 @@ def arrow() -> tuple[Any, Any]:
     return library("pyarrow", "datasets", what), library("pyarrow.parquet", "datasets", what)
 
 
-MEGABYTE = 2**20
 MAX_VALUE = 1e6
 """[rad or m] Maximum value of a joint; 32 bits hold it."""
 
@@ -271,8 +268,9 @@ class LerobotWriter:
                 if feature["dtype"] != "video"
             ]
         )
-        self._data: Any = None
-        self._data_file, self._data_bytes = -1, 0
+        path = folder / DATA_PATH.format(**FIRST_FILE)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._data = self._parquet.ParquetWriter(path, self._schema, compression="snappy")
         self._tasks: dict[str, int] = {}
         self._rows: list[dict[str, Any]] = []
         self._columns: list[dict[str, npt.NDArray[Any]]] = []
@@ -325,18 +323,15 @@ class LerobotWriter:
             TASK: np.full(count, self._tasks.setdefault(task, len(self._tasks))),
         }
         self._write_rows(columns)
-        chunk, file = place(self._data_file)
         row = {
             "episode_index": number,
             "tasks": [task],
             "length": count,
-            "data/chunk_index": chunk,
-            "data/file_index": file,
+            **{f"data/{index}": number for index, number in FIRST_FILE.items()},
             "dataset_from_index": self._frames,
             "dataset_to_index": self._frames + count,
             "success": success,
-            "meta/episodes/chunk_index": 0,
-            "meta/episodes/file_index": 0,
+            **{f"meta/episodes/{index}": number for index, number in FIRST_FILE.items()},
             **videos,
         }
         for feature, statistics in {**_statistics(columns), **picture_statistics}.items():
@@ -370,25 +365,12 @@ class LerobotWriter:
         _write_json(folder / INFO_PATH, info)
 
     def close(self) -> None:
-        """Close the present file of rows."""
-        if self._data is not None:
-            self._data.close()
-            self._data = None
+        """Close the file of rows."""
+        self._data.close()
 
     def _write_rows(self, columns: Mapping[str, npt.NDArray[Any]]) -> None:
-        table = self._arrow.table(
-            [self._array(field, columns[field.name]) for field in self._schema], self._schema
-        )
-        if self._data_bytes > DATA_MB * MEGABYTE:
-            self.close()
-        if self._data is None:
-            self._data_file, self._data_bytes = self._data_file + 1, 0
-            chunk, file = place(self._data_file)
-            path = self._folder / DATA_PATH.format(chunk_index=chunk, file_index=file)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._data = self._parquet.ParquetWriter(path, self._schema, compression="snappy")
-        self._data.write_table(table)
-        self._data_bytes += table.nbytes
+        arrays = [self._array(field, columns[field.name]) for field in self._schema]
+        self._data.write_table(self._arrow.table(arrays, self._schema))
 
     def _array(self, field: Any, values: npt.NDArray[Any]) -> Any:
         pa = self._arrow
