@@ -180,7 +180,9 @@ def test_mechanism_without_an_arm_is_recorded(
         inputs = [Submission(command, ADA) for command in orders]
         records.append(TickRecord(before.t, t, inputs, False, state))
     with path.open("wb") as file:
-        writer = RecordingWriter(file, header_of(gantry.robot, Settings(), GANTRY))
+        environment = gantry.session.environment
+        head = header_of(gantry.robot, Settings(), GANTRY, None, environment)
+        writer = RecordingWriter(file, head)
         for record in records:
             writer.put(record)
         writer.close()

@@ -290,11 +290,8 @@ def pose_of(T: FloatArray, digits: int = DIGITS) -> Pose:
 class StateMessages:
     """Makes the messages of the states of one robot, one after another."""
 
-    def __init__(self, robot: Robot, environment: Environment | None) -> None:
-        """Describe the states of ``robot``.
-
-        ``environment`` gives the poses of objects in the hand. Without it they are left out.
-        """
+    def __init__(self, robot: Robot, environment: Environment) -> None:
+        """Describe states of ``robot``; ``environment`` gives the poses of objects in the hand."""
         self._robot, self._environment = robot, environment
         self._poses: dict[str, ObjectPose] = {}
         self._objects: tuple[SceneObject, ...] | None = None
@@ -359,15 +356,12 @@ class StateMessages:
 
     def _object_poses(self, state: State) -> Iterator[ObjectPose]:
         for item in state.objects:
-            known = self._poses.get(item.name)
             if not item.carried:
                 yield ObjectPose(item.name, *pose_of(item.T))
-            elif self._environment is not None:
+            else:
                 # It follows from the joints, and changes in every tick.
                 T = self._environment.pose(item, state.x)
                 yield ObjectPose(item.name, *pose_of(T, SHOWN_DIGITS), item.held)
-            elif known is not None:
-                yield known
 
     def describe_all(self) -> None:
         """Describe all objects with the next state, also those that have not changed."""

@@ -126,13 +126,13 @@ class RecordingHeader:
 
     Attributes:
         robot: the robot.
-        environment: gives the poses of objects in the hand; None to leave them out.
+        environment: gives the poses of objects in the hand.
         metadata: texts by their names, see ``header_of``.
         attachments: files that belong to it.
     """
 
     robot: Robot
-    environment: Environment | None
+    environment: Environment
     metadata: Mapping[str, str]
     attachments: tuple[Attachment, ...] = ()
 
@@ -141,8 +141,8 @@ def header_of(
     robot: Robot,
     settings: Settings,
     urdf: Path,
-    tool: str | None = None,
-    environment: Environment | None = None,
+    tool: str | None,
+    environment: Environment,
 ) -> RecordingHeader:
     """Return the header of a recording that begins now. Raises InputError without the URDF.
 
