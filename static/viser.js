@@ -199,10 +199,13 @@ export const viewOf = (message) =>
 export const choiceOf = ({ uuid = "", updates }) =>
   groups.has(uuid) ? { label: groups.get(uuid), value: updates?.value ?? "" } : null;
 
+/** Send a message as if viser's page had. @param {ViserPage.Message} message */
+export const send = (message) => page?.postMessage({ type: SEND, message });
+
 /** Press the button `value` of the row `label`, which need not be shown. @param {string} label @param {string} value */
 export function press(label, value) {
   for (const [uuid, name] of groups)
-    if (name === label) page?.postMessage({ type: SEND, message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
+    if (name === label) send({ type: "GuiUpdateMessage", uuid, updates: { value } });
 }
 
 /** Show a node in this page, or show it as the server does. @param {string} name @param {boolean} [visible] */

@@ -1,5 +1,6 @@
 // A handle while a person drags it: how far it is from where it was, in words beside the pointer. With Ctrl it goes by
-// steps, with Shift more finely. Both change the poses of viser's own messages, which remain the only commands.
+// steps, with Shift more finely, and a typed number takes it there. All of it changes the poses of viser's own messages,
+// which remain the only commands.
 import { sceneIn, write } from "../dom.js";
 import { html, signed } from "../instruments/shape.js";
 import { placeBeside } from "./place_near.js";
@@ -11,17 +12,23 @@ const STRAIGHT = 1 - 1e-9; // cosine of a turn from which on it counts as none
 const MOVED = 1e-6; // m, below which a handle rests
 const STEPS = { move: 0.01, turn: 15 / DEGREES }; // m and rad, with Ctrl
 const FINE = 0.2; // fraction of the way of the pointer, with Shift
+const SOON = 5000; // ms after a drag in which a typed number belongs to it
+const FARTHEST = 1.5; // m, the largest coordinate that the server takes
+const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)$/;
 
 /**
  * `axis` is its own axis along which it moves, or about which it turns; null before it does. How far it is from its
- * start, in m or rad: `raw` as viser's page moves it, `value` more finely, `shown` by steps too.
+ * start, in m or rad: `raw` as viser's page moves it, `value` more finely, `shown` by steps too. `sent` has the last
+ * message of each phase.
  * @typedef {object} Drag
  * @property {string} name @property {Three.Matrix4} start @property {number | null} axis @property {boolean} turns
  * @property {number} raw @property {number} value @property {number} shown @property {string} drawn
+ * @property {Record<string, ViserPage.Message>} sent
  */
 
-/** Place a handle where its drag shows it. @param {Three.Matrix4} matrix @param {Drag} drag */
-function place({ elements }, { start, axis, turns, shown }) {
+/** Put a handle where its drag shows it. @param {Three.Matrix4} matrix @param {Drag} drag */
+function put({ elements }, drag) {
+  const { start, axis, turns, shown } = drag;
   const [from, k] = [start.elements, axis ?? 0];
   const [a, b, cosine, sine] = [4 * ((k + 1) % 3), 4 * ((k + 2) % 3), Math.cos(shown), Math.sin(shown)];
   from.forEach((element, i) => (elements[i] = element));
@@ -30,6 +37,7 @@ function place({ elements }, { start, axis, turns, shown }) {
       elements[a + i] = cosine * from[a + i] + sine * from[b + i];
       elements[b + i] = cosine * from[b + i] - sine * from[a + i];
     } else elements[12 + i] += shown * from[4 * k + i];
+  drag.drawn = elements.join();
 }
 
 /** Change the pose of a message in itself, because viser's page keeps the same arrays. @param {ViserPage.Message} message @param {Drag} drag @param {number} by */
@@ -53,6 +61,12 @@ export class Handle {
   #store;
   /** @type {Drag | null} */
   #drag = null;
+  /** @type {Drag | null} */
+  #last = null; // the one before, for a number that is typed soon after it
+  #ended = 0; // time of its end [ms]
+  /** @type {Drag | null} */
+  #typed = null; // the one whose number is typed
+  #sending = false;
   /** @type {Page.Pixel} */
   #pixel = [0, 0]; // of the pointer
   #touch = false;
@@ -60,13 +74,22 @@ export class Handle {
   #fine = false;
   // The state line and the panel say the same to screen readers.
   #label = html("p", { id: "handle-label", class: "scene-label", "aria-hidden": "true", hidden: "" });
+  #what = html("label", { for: "handle-number" });
+  #number = html("input", { id: "handle-number", type: "text", inputmode: "decimal", autocomplete: "off", size: 7 });
+  #unit = html("span");
+  #form = html("form", { id: "handle-form", hidden: "" }, this.#what, this.#number, this.#unit);
 
   /** @param {HTMLElement} stage @param {HTMLIFrameElement} scene @param {Page.Store} store */
   constructor(stage, scene, store) {
     this.#scene = scene;
     this.#store = store;
-    stage.append(this.#label);
+    stage.append(this.#label, this.#form);
     store.follow(() => this.#draw());
+    this.#form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#enter();
+    });
+    this.#number.addEventListener("blur", () => this.close());
   }
 
   /** Note where the pointer is, before viser's page gets the event. @param {PointerEvent} event */
@@ -87,20 +110,73 @@ export class Handle {
 
   /** A message of viser's page about a drag is about to be sent. @param {ViserPage.Message} message */
   hear(message) {
+    if (this.#sending) return;
     const { node, phaseOf } = sceneIn(this.#scene);
     const { name = "" } = message;
     const phase = phaseOf(message);
     const start = node(name)?.matrix.clone();
-    if (phase === "Start" && start) this.#drag = { name, start, axis: null, turns: false, raw: 0, value: 0, shown: 0, drawn: "" };
-    else if (phase === "End") this.drop();
+    if (phase === "Start" && start) this.#drag = { name, start, axis: null, turns: false, raw: 0, value: 0, shown: 0, drawn: "", sent: {} };
     this.#follow();
-    if (phase === "Update" && this.#drag) change(message, this.#drag, this.#drag.shown - this.#drag.raw);
+    const drag = this.#drag;
+    if (!drag || !phase) return;
+    drag.sent[phase] = message;
+    if (phase === "Update") change(message, drag, drag.shown - drag.raw);
+    if (phase !== "End") return;
+    [this.#drag, this.#last, this.#ended] = [null, drag, performance.now()];
+    this.#draw();
   }
 
-  // Forget the drag, which has ended or was ended by something else.
+  // Forget the drag, which was ended by something else.
   drop() {
-    this.#drag = null;
+    this.#drag = this.#last = null;
+    this.close();
+  }
+
+  // Close the box of the number.
+  close() {
+    this.#typed = null;
+    this.#form.hidden = true;
     this.#draw();
+  }
+
+  /** Open the box of the number with its first key; return whether the event was handled. @param {KeyboardEvent} event */
+  key({ key, type, ctrlKey, metaKey, altKey }) {
+    const drag = this.#drag ?? (performance.now() - this.#ended < SOON ? this.#last : null);
+    if (type !== "keydown" || ctrlKey || metaKey || altKey || !/^[\d-]$/.test(key)) return false;
+    if (!drag || drag.axis === null || !drag.sent.Update) return false;
+    this.#typed = drag;
+    write(this.#what, nameOf(drag, drag.axis));
+    write(this.#unit, drag.turns ? "°" : "mm");
+    this.#number.value = key;
+    this.#number.ariaInvalid = "false";
+    this.#form.hidden = false;
+    this.#draw();
+    placeBeside(this.#form, this.#scene, this.#pixel, this.#touch);
+    this.#number.focus();
+    return true;
+  }
+
+  // Send the handle of the drag to the typed number.
+  #enter() {
+    const [drag, text] = [this.#typed, this.#number.value.trim().replace(",", ".").replace("−", "-")];
+    const { Start, Update, End } = drag?.sent ?? {};
+    if (!drag || drag.axis === null || !Update) return this.close();
+    const shown = Number(text) / (drag.turns ? DEGREES : 1000);
+    const { drawing, node, send } = sceneIn(this.#scene);
+    const place = drag.start.elements.slice(12, 15).map((x, i) => x + shown * drag.start.elements[4 * (drag.axis ?? 0) + i]);
+    const isPossible = drag.turns ? Math.abs(shown) <= Math.PI : Math.max(...place.map(Math.abs)) <= FARTHEST;
+    this.#number.ariaInvalid = String(!NUMBER.test(text) || !isPossible);
+    if (this.#number.ariaInvalid === "true") return;
+    change(Update, drag, shown - drag.shown);
+    drag.value = drag.shown = shown;
+    const matrix = node(drag.name)?.matrix;
+    if (matrix) put(matrix, drag);
+    drawing().requestRender();
+    this.#sending = true;
+    for (const message of drag === this.#drag ? [Update] : [Start, Update, End]) send(message);
+    this.#sending = false;
+    this.#ended = performance.now();
+    this.close();
   }
 
   // Find how far viser's page has moved the handle, and draw it where it is sent to.
@@ -126,26 +202,26 @@ export class Handle {
     drag.raw += by;
     drag.value += this.#fine ? FINE * by : by;
     drag.shown = this.#snaps ? step * Math.round(drag.value / step) : drag.value;
-    if (drag.shown !== drag.raw) place(now, drag);
-    drag.drawn = now.elements.join();
+    if (drag.shown !== drag.raw) put(now, drag);
+    else drag.drawn = now.elements.join();
     this.#draw();
   }
 
   #draw() {
     const drag = this.#drag;
-    this.#label.hidden = !drag || drag.axis === null;
+    this.#label.hidden = !drag || drag.axis === null || this.#typed !== null;
     if (!drag || drag.axis === null) return;
     const { clearance } = this.#store.live ?? {};
     const near = clearance ? `\n${clearance.distance.toFixed(1)} mm to the ${clearance.parts[1]}` : "";
-    write(this.#label, `${this.#words(drag, drag.axis)}${near}`);
+    const number = signed(drag.shown * (drag.turns ? DEGREES : 1000));
+    const plus = /^[1-9]|^0\.[1-9]/.test(number) ? "+" : "";
+    write(this.#label, `${nameOf(drag, drag.axis)} ${plus}${number}${drag.turns ? "°" : " mm"}${near}`);
     placeBeside(this.#label, this.#scene, this.#pixel, this.#touch);
   }
+}
 
-  /** @param {Drag} drag @param {number} axis */
-  #words({ name, turns, shown }, axis) {
-    const ring = name.slice(name.lastIndexOf("/") + 1);
-    const what = turns ? (RINGS.includes(ring) ? ring : `about ${AXES[axis]}`) : AXES[axis];
-    const number = signed(shown * (turns ? DEGREES : 1000));
-    return `${what} ${/^[1-9]|^0\.[1-9]/.test(number) ? "+" : ""}${number}${turns ? "°" : " mm"}`;
-  }
+/** Return the word for what a drag changes. @param {Drag} drag @param {number} axis */
+function nameOf({ name, turns }, axis) {
+  const ring = name.slice(name.lastIndexOf("/") + 1);
+  return turns ? (RINGS.includes(ring) ? ring : `about ${AXES[axis]}`) : AXES[axis];
 }

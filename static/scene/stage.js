@@ -85,7 +85,13 @@ export class Stage {
   // Select nothing.
   clear() {
     this.#joints.select(null);
+    this.#handle.close();
     this.#selection?.clear();
+  }
+
+  /** Return whether the key was handled. @param {KeyboardEvent} event */
+  key(event) {
+    return this.#handle.key(event);
   }
 
   // Release what the pointer holds.

@@ -13,7 +13,7 @@ from tests.browser.finger import fingers
 from tests.browser.page import ViserPage
 from tests.browser.person import still
 from tests.browser.server import AppServer
-from tests.browser.session import MOVE, Truth, take
+from tests.browser.session import MOVE, Truth, clear_stop, take
 from tests.browser.sizes import PHONE, PORTRAIT
 
 PITCH = "/target/move/pitch"
@@ -114,6 +114,67 @@ def test_control_snaps_and_shift_slows_a_drag(page: ViserPage, truth: Truth) -> 
         assert number(label(page)) == pytest.approx(3.4, abs=0.8)
     keyboard.up("Shift")
     assert pitch() - start == pytest.approx(0.06, abs=0.014)
+
+
+def test_typed_number_is_the_distance_of_the_drag(
+    page: ViserPage, truth: Truth, artefacts: Path
+) -> None:
+    form, keyboard = page.page.locator("#handle-form"), page.page.keyboard
+    start = truth.status()["T"][2][3]
+
+    def reaches(distance: float) -> None:
+        def is_there() -> bool:
+            state = truth.status()
+            return not state["moving"] and abs(state["T"][2][3] - start - distance) < 1e-6
+
+        page.wait_until(is_there, f"{distance} m", seconds=20.0)
+
+    drawn = page.node_pose(MOVE)[2, 3]
+    with page.grip_arrow(MOVE, "z") as grip:
+        grip.sweep(0.02, 4)
+        page.wait_until(lambda: label(page).startswith("z +"), "the label")
+        keyboard.type("35,5")
+        assert form.inner_text().split() == ["z", "mm"]
+        assert label(page) == ""
+        page.keep(artefacts / "handle-number.png")
+        keyboard.press("Enter")
+        page.wait_until(lambda: label(page) == "z +35.5 mm", "the number in the label")
+        reaches(0.0355)
+    reaches(0.0355)
+    # The number still belongs to the drag, which has ended, and counts from its start.
+    keyboard.type("-")
+    form.wait_for()
+    keyboard.press("Enter")
+    assert page.page.get_attribute("#handle-number", "aria-invalid") == "true"
+    keyboard.type("12.5")
+    keyboard.press("Enter")
+    form.wait_for(state="hidden")
+    reaches(-0.0125)
+    assert page.node_pose(MOVE)[2, 3] - drawn == pytest.approx(-0.0125, abs=1e-6)
+    # The next drag begins where the handle is drawn.
+    with page.grip_arrow(MOVE, "z") as grip:
+        grip.sweep(0.01, 4)
+        page.wait_until(lambda: label(page).startswith("z +"), "the label")
+        assert number(label(page)) == pytest.approx(10.0, abs=PIXEL)
+    keyboard.type("9")
+    form.wait_for()
+    keyboard.press("Escape")
+    form.wait_for(state="hidden")
+    truth.wait(mood="stopped")
+    clear_stop(page, truth)
+
+
+@pytest.mark.long
+def test_typed_angle_is_that_of_the_ring(page: ViserPage, truth: Truth) -> None:
+    start = truth.status()["pitch"]
+    with page.grip_ring(PITCH, "y") as grip:
+        grip.sweep(-0.1, 4)
+        page.wait_until(lambda: label(page).startswith("pitch −"), "the label")
+    page.page.keyboard.type("-20")
+    page.page.keyboard.press("Enter")
+    page.wait_until(
+        lambda: abs(truth.status()["pitch"] - start - math.radians(-20.0)) < 1e-5, "the angle"
+    )
 
 
 @pytest.mark.long

@@ -204,6 +204,10 @@ def test_page_tells_and_takes_views(page: ViserPage) -> None:
         ask(page, "Viser.press('View', 'Side')")
         page.wait_until(lambda: ask(page, "tapped.sets.length") == 3, "the view of the server")
         assert ask(page, "tapped.choices.at(-1)") == {"label": "View", "value": "Side"}
+    with part("send"):
+        look = "harness.sent.findLast(({ type }) => type === 'ViewerCameraMessage').body"
+        ask(page, f"Viser.send({{ ...{look}, fov: 0.5 }})")
+        assert ask(page, f"{look}.fov") == 0.5
     with part("viewing"):
         view = {"position": [0.0, 1.5, 1.0], "look_at": [0, 0, 0], "up_direction": [0, 0, 1]}
         page.frame.evaluate("(view) => tapped.line.show(Viser.viewing(view))", view)
