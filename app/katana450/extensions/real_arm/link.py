@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import os
+import logging
 import socket
 import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from logging.handlers import RotatingFileHandler
 from pathlib import Path
-from typing import Protocol, TextIO
+from typing import Protocol
 from urllib.parse import urlsplit
 
 from katana450.errors import ConfigurationError, InputError, KatanaError
@@ -177,7 +178,7 @@ SENT, RECEIVED, CONNECTED = ">", "<", "="
 """Marks of a line: bytes to the arm, bytes from it, and a new connection."""
 
 
-class ExchangeLog:
+class ExchangeLog(RotatingFileHandler):
     """A file with a line for each write and read.
 
     A line holds the time [s since 1970], a mark, and the bytes as hexadecimal numbers.
@@ -185,36 +186,20 @@ class ExchangeLog:
 
     def __init__(self, path: Path) -> None:
         """Open ``path``, which is continued. Raises ConfigurationError."""
-        self._path = path
-        self._file: TextIO | None = self._opened()
-
-    def note(self, mark: str, data: bytes = b"") -> None:
-        """Write a line. A full disk ends the log, not the motion of an arm."""
-        if self._file is None:
-            return
         try:
-            self._file.write(f"{time.time():.6f} {mark} {data.hex(' ')}".rstrip() + "\n")
-            if self._file.tell() > MAX_LOG_BYTES:
-                self._file.close()
-                os.replace(self._path, self._path.with_name(f"{self._path.name}.1"))
-                self._file = self._opened()
-        except (OSError, ConfigurationError):
-            self._file = None
-
-    def close(self) -> None:
-        """End the log."""
-        if self._file is not None:
-            self._file.close()
-            self._file = None
-
-    def _opened(self) -> TextIO:
-        try:
-            # Line by line, so that a reader follows and a crash loses nothing.
-            return self._path.open("a", encoding="ascii", buffering=1)
+            super().__init__(path, maxBytes=MAX_LOG_BYTES, backupCount=1, encoding="ascii")
         except OSError as error:
             raise ConfigurationError(
-                f"The log {self._path} cannot be written: {error.strerror}."
+                f"The log {path} cannot be written: {error.strerror}."
             ) from error
+
+    def note(self, mark: str, data: bytes = b"") -> None:
+        """Write a line."""
+        row = f"{time.time():.6f} {mark} {data.hex(' ')}".rstrip()
+        self.handle(logging.makeLogRecord({"msg": row}))
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Do nothing: a full disk ends neither the motion of an arm nor the log."""
 
 
 EXCHANGE_TIMEOUT = 0.3
