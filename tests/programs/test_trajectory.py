@@ -158,7 +158,7 @@ def test_contact_is_refused_with_its_time_and_the_parts(stage: Stage) -> None:
     text = str(caught.value)
     assert "line 2" in text
     assert " and box would " in text
-    moment = float(text.split("At ")[1].split(maxsplit=1)[0])
+    moment = float(text.split("blocked at ")[1].split(maxsplit=1)[0])
     # The box is at the turning point, after 2 s.
     assert 101.0 < moment < 102.0
 

@@ -165,7 +165,7 @@ def test_present_obstacle_is_refused_with_moment_and_pair(dragged: Path) -> None
     with pytest.raises(ScriptError) as caught:
         planned(text, start)
     match = re.search(
-        r"At ([\d.]+) s of the trajectory, with the tool at .* and stone would", str(caught.value)
+        r"at ([\d.]+) s of the trajectory, with the tool at .* and stone would", str(caught.value)
     )
     assert match is not None, str(caught.value)
     # The moment of the recording at which the arm first comes too near.

@@ -204,29 +204,39 @@ def plan(
     return replace(whole_plan, nearest=min(pieces, key=lambda n: n.contact.distance, default=None))
 
 
-def check_clear(path: Path, world: CollisionWorld, fingers: float) -> None:
-    """Raise BlockedError, as `plan`, unless the whole of `path` keeps MARGIN."""
-    _clearance(path, world, fingers, MARGIN, with_nearest=False)
+def check_clear(
+    path: Path,
+    world: CollisionWorld,
+    fingers: float,
+    margin: float = MARGIN,
+    place: Callable[[float], str] = lambda sigma: f"{100.0 * sigma:.0f} % along it",
+) -> tuple[SweptClearance, Sweep]:
+    """Return what shows that the whole of `path` keeps `margin`; raise BlockedError, as `plan`.
 
-
-def _clearance(
-    path: Path, world: CollisionWorld, fingers: float, margin: float, *, with_nearest: bool = True
-) -> Clearance | None:
-    """Return the nearest contact on `path` if `with_nearest`; raise BlockedError if too near."""
+    ``place``: returns a place of the path in words.
+    """
     sweep = Sweep(path)
     room = SweptClearance.about(world, margin, sweep.at(0.0, fingers), sweep.at(1.0, fingers))
     contact = sweep.blocked(room, fingers)
     if contact is None:
-        return sweep.nearest(room, fingers) if with_nearest else None
+        return room, sweep
     x = sweep.at(contact.sigma, fingers)
     worst = room.worst(x)
     raise BlockedError(
-        f"The path is blocked {100.0 * contact.sigma:.0f} % along it, with the tool at {{point}}: "
+        f"The path is blocked {place(contact.sigma)}, with the tool at {{point}}: "
         f"{{parts}} would {apart(worst.distance)}, and {1e3 * margin:g} mm are required. Lead the "
         "path around the obstacle, or move it.",
         forward(path.chain, x[:-1])[:3, 3].tolist(),
         parts=worst.parts,
     )
+
+
+def _clearance(
+    path: Path, world: CollisionWorld, fingers: float, margin: float
+) -> Clearance | None:
+    """Return the nearest contact on `path`; raise BlockedError if it is too near."""
+    room, sweep = check_clear(path, world, fingers, margin)
+    return sweep.nearest(room, fingers)
 
 
 def apart(distance: float) -> str:

@@ -111,11 +111,6 @@ class Scaling:
         distance, a, j = (x / fraction for x in (self.span, self.acceleration, self.jerk))
         return rest_to_rest(distance, a, j)
 
-    def tau_after(self, t: float, fraction: float = 1.0) -> float:
-        """Return tau [s] at ``t`` [s] after the start at ``fraction`` of full speed."""
-        distance, a, j = (x / fraction for x in (self.span, self.acceleration, self.jerk))
-        return fraction * motion_after(t, distance, a, j)[0]
-
     def motion_after(self, t: float) -> tuple[float, float, float]:
         """Return tau [s], tau' [1] and tau'' [1/s] at ``t`` [s] after the start at full speed."""
         return motion_after(t, self.span, self.acceleration, self.jerk)

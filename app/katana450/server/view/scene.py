@@ -170,7 +170,7 @@ def _as_made(server: Window, name: str, link: Link, number: int) -> viser.GlbHan
     )
 
 
-def glb(shapes: Sequence[VisualMesh], opacity: float = 1.0) -> bytes:
+def glb(shapes: Sequence[VisualMesh]) -> bytes:
     """Return a binary glTF file of ``shapes`` with their normals and materials."""
     # Imported here, because the import takes longer than the rest of the start.
     import trimesh
@@ -181,8 +181,7 @@ def glb(shapes: Sequence[VisualMesh], opacity: float = 1.0) -> bytes:
     for shape in shapes:
         name, colour, metallic, rough = shape.material
         material = looks.material.PBRMaterial(name, metallicFactor=metallic, roughnessFactor=rough)
-        material.baseColorFactor = [*to_light(colour), opacity]
-        material.alphaMode = None if opacity == 1.0 else "BLEND"
+        material.baseColorFactor = [*to_light(colour), 1.0]
         mesh: Any = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
         mesh.vertex_normals = shape.normals
         mesh.visual = looks.TextureVisuals(material=material)

@@ -12,7 +12,7 @@ from typing import Annotated, Final
 import numpy as np
 
 from katana450.arm.control.session.session import TOOL_SPEED
-from katana450.errors import BlockedError, InputError
+from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import (
     CARRY,
@@ -37,13 +37,11 @@ from katana450.extensions.programs.language.source import YamlValue
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward
-from katana450.maths.planning.clearance import Sweep, SweptClearance
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.joint_path import VIA_TOLERANCE, PolynomialPath
 from katana450.maths.planning.pacing import KNOTS, SampledPath
 from katana450.maths.planning.path import Path
-from katana450.maths.planning.plan import apart
+from katana450.maths.planning.plan import check_clear
 from katana450.maths.planning.plan import plan as timed_plan
 from katana450.maths.planning.polyline import PiecewisePolynomial
 from katana450.maths.planning.scaling import Bounds, Scaling
@@ -185,9 +183,9 @@ class TrajectoryPath(PolynomialPath):
         """The joint angles (n,) [rad] at the end."""
         return frozen(self.postures[-1])
 
-    def time(self, sigma: float) -> float:
-        """Return the time [s] at the place ``sigma``, on the clock of ``times``."""
-        return float(self.times[0]) + sigma * self.duration
+    def moment(self, sigma: float) -> str:
+        """Return the place ``sigma`` in words: its time on the clock of ``times``."""
+        return f"at {self.times[0] + sigma * self.duration:.2f} s of the trajectory"
 
 
 PIECE_TIME: Final = 0.1
@@ -320,28 +318,8 @@ class FollowTrajectory(Step, word="trajectory"):
             raise InputError(f"The arm has {joints} joints; a row of this has {columns} angles.")
         path = TrajectoryPath(plan.chain, times, postures)
         plan = plan.move_to(path.start, f"{TRAJECTORY}: approach")
-        _check_clear(plan, path)
         arm, world = plan.plan_context.arm, plan.world
+        if world is not None:
+            check_clear(path, world, plan.state.gripper_setpoint, CLEARANCE, path.moment)
         untimed = UntimedTrajectory(arm, world, plan.state, (path,))
         return plan.with_action(TRAJECTORY, untimed, plan.standing(path.end).state)
-
-
-def _check_clear(plan: PlanState, path: TrajectoryPath) -> None:
-    """Raise BlockedError, with the time, unless all of ``path`` keeps CLEARANCE from everything."""
-    world, fingers = plan.world, plan.state.gripper_setpoint
-    if world is None:
-        return
-    sweep = Sweep(path)
-    room = SweptClearance.about(world, CLEARANCE, sweep.at(0.0, fingers), sweep.at(1.0, fingers))
-    nearest = sweep.blocked(room, fingers)
-    if nearest is None:
-        return
-    x = sweep.at(nearest.sigma, fingers)
-    worst = room.worst(x)
-    raise BlockedError(
-        f"At {path.time(nearest.sigma):.2f} s of the trajectory, with the tool at {{point}}, "
-        f"{{parts}} would {apart(worst.distance)}, and {1e3 * CLEARANCE:g} mm are required. "
-        "Move the obstacle, or leave this part out.",
-        forward(path.chain, x[: path.chain.n])[:3, 3].tolist(),
-        parts=worst.parts,
-    )
