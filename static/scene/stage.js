@@ -3,6 +3,7 @@
 import { matches, sceneIn, styled } from "../dom.js";
 import { readArm } from "../server.js";
 import { Branches } from "./branches.js";
+import { Clearance } from "./clearance.js";
 import { Glow, shapesOf } from "./glow.js";
 import { Handle } from "./handle.js";
 import { Joints } from "./joints.js";
@@ -42,6 +43,7 @@ export class Stage {
     styled("scene.css", import.meta.url);
     this.#joints = new Joints(stage, scene, page);
     this.#handle = new Handle(stage, scene, page.store);
+    new Clearance(stage, scene, page.store);
     this.#load();
     this.#views = new Views(stage, scene);
     this.#listen();

@@ -21,6 +21,9 @@ MOVE, PITCH = "/target/move", "/target/move/pitch"
 # A dragged handle is within a pixel of its target: 1 mm at this distance.
 PIXEL = 2e-3
 
+FINGERTIP = 80.0
+"""Maximum distance [px] of the tip of a finger from the tool point."""
+
 
 class Robot:
     """The arm as a page shows it and as the messages describe it.
@@ -157,38 +160,31 @@ def ghost_is_shown(robot: Robot) -> bool:
     return bool(last.body["visible"])
 
 
-def test_arm_stops_before_the_table_with_reason_and_warning_colour(
+def test_arm_stops_before_the_table_with_reason_and_distance(
     robot: Robot, truth: Truth, artefacts: Path
 ) -> None:
     page = robot.page
-    robot.page.drag_slider("2 shoulder", 5.0)
-    robot.page.wait_until(lambda: "mm apart" in robot.text(), "the reason", seconds=20.0)
-    reason = robot.text()
-    assert "finger and table" in reason
-    coats = [f"{robot.path[f'finger_{side}_link']}/contact0" for side in ("left", "right")]
-
-    def shown() -> list[str]:
-        return [
-            coat
-            for coat in coats
-            if not robot.page.frame.evaluate("(name) => harness.missing([name])", coat)
-        ]
-
-    coats_shown: list[str] = []
-
-    def appeared() -> bool:
-        coats_shown.extend(shown())
-        return bool(coats_shown)
-
-    # Which finger is nearer can change again at once.
-    robot.page.wait_until(appeared, "the warning colour")
-    coat = coats_shown[0]
-    robot.page.wait_drawn()
-    robot.page.keep(artefacts / "app-contact.png")
+    length = page.page.locator("#clearance-label")
+    assert not length.is_visible()
+    page.drag_slider("2 shoulder", 5.0)
+    page.wait_until(lambda: "mm apart" in robot.text(), "the reason", seconds=20.0)
+    assert "finger and table" in robot.text()
+    truth.wait(20.0, moving=False)
+    distance = 1e3 * truth.status()["margins"]["clearance"]
+    page.wait_until(lambda: length.inner_text() == f"{distance:.1f} mm", f"{distance:.1f} mm")
+    tool = page.project(robot.drawn()[:3, 3])
+    boxes = [point.bounding_box() for point in page.page.locator("#clearance circle").all()]
+    (x, y), (x_table, y_table) = (
+        (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2) for box in boxes if box
+    )
+    assert math.dist((x, y), tool) < FINGERTIP
+    # The nearest point of the table is straight below that of the finger.
+    assert x_table == pytest.approx(x, abs=2.0)
+    assert 2.0 < y_table - y < 20.0
+    page.keep(artefacts / "app-contact.png")
     go_home(page, truth)
-    robot.page.wait_until(lambda: "On target" in robot.text(), "the reason to go")
-    (last,) = robot.page.messages("SetSceneNodeVisibilityMessage", node=coat, last=1)
-    assert not last.body["visible"]
+    page.wait_until(lambda: "On target" in robot.text(), "the reason to go")
+    page.wait_until(lambda: not length.is_visible(), "the line to go")
 
 
 @pytest.mark.long

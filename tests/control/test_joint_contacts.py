@@ -219,7 +219,7 @@ def test_an_object_is_an_obstacle_until_it_is_removed(make: Make) -> None:
     # The goal stays, so the beam continues down to the table once the object is away.
     state = during(session, state, 3.0, cmd.Remove("block"))[-1]
     assert height(state) == pytest.approx(MIN_CLEARANCE, abs=3e-3)
-    assert state.near == {"beam", "table"}
+    assert state.findings[0].parts == ("beam", "table")
 
 
 def test_commands_about_a_hand_or_water_are_refused(make: Make) -> None:

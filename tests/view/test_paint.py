@@ -1,11 +1,11 @@
-"""Paint of the arm and of objects: what a state colours, and coats near a contact."""
+"""Paint of the arm and of objects: what a state colours."""
 
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,14 +14,12 @@ import viser
 
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.appearance import Appearance, AppearanceTrait
-from katana450.arm.control.state.state import Finding, Reason, State
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.loader import load
-from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.resources import URDF_PATH
-from katana450.server.view.paint import PaintNodes, Tint
+from katana450.server.view.paint import PaintNodes
 from katana450.server.view.scene import ArmNodes
-from katana450.server.view.scenery import add_table
 from katana450.srgb import to_light
 from tests.viser_bridge import internals
 from tests.viser_bridge.internals import nodes
@@ -80,74 +78,6 @@ def test_link_is_painted_hidden_and_restored(shown: Shown) -> None:
     shown.show(appearance=Appearance())
     assert [shape.visible for shape in shown.arm.shapes["pan_link"]] == visible
     assert shown.painted() == {}
-
-
-@dataclass
-class Coat:
-    visible: bool = True
-
-
-@dataclass
-class Scene:
-    """A scene that records added meshes."""
-
-    coats: dict[str, Coat] = field(default_factory=dict)
-
-    def add_mesh_simple(self, name: str, *_surface: object, **_look: object) -> Coat:
-        self.coats[name] = Coat()
-        return self.coats[name]
-
-    def coated(self) -> set[str]:
-        return {name.split("/")[1] for name, coat in self.coats.items() if coat.visible}
-
-
-@dataclass
-class Server:
-    scene: Scene
-
-
-def touching(state: State, one: str, other: str) -> State:
-    return replace(state, findings=(Finding(Reason.CONTACT, 0.006, parts=(one, other)),))
-
-
-def test_both_parts_are_coated_until_they_are_apart(robot: Robot, state: State) -> None:
-    scene = Scene()
-    paths = {body.name: f"/{body.name}" for body in robot.links}
-    tint = Tint(cast(Any, Server(scene)), robot, paths, load_props())
-    tint.follow(state)
-    assert scene.coats == {}
-    tint.follow(touching(state, "finger_left_link", "upper_arm_link"))
-    assert scene.coated() == {"finger_left_link", "upper_arm_link"}
-    body = next(body for body in robot.links if body.name == "finger_left_link")
-    assert sum("finger_left" in name for name in scene.coats) == len(body.collisions)
-    tint.follow(touching(state, "finger_left_link", "bench"))
-    assert scene.coated() == {"finger_left_link"}
-    number = len(scene.coats)
-    tint.follow(state)
-    assert scene.coated() == set()
-    tint.follow(touching(state, "finger_left_link", "upper_arm_link"))
-    assert len(scene.coats) == number
-    assert scene.coated() == {"finger_left_link", "upper_arm_link"}
-
-
-@pytest.mark.parametrize("scene_object", ["table", "cup", "basin"])
-def test_object_near_a_contact_is_coated(robot: Robot, state: State, scene_object: str) -> None:
-    scene = Scene()
-    paths = {body.name: f"/{body.name}" for body in robot.links}
-    tint = Tint(cast(Any, Server(scene)), robot, paths, load_props())
-    tint.follow(touching(state, "gripper_link", scene_object))
-    assert scene.coated() == {"gripper_link", scene_object}
-    tint.follow(state)
-    assert scene.coated() == set()
-
-
-def test_viser_accepts_the_coats(robot: Robot, state: State, server: viser.ViserServer) -> None:
-    add_table(server, load_props())
-    paths = {body.name: f"/{body.name}" for body in robot.links}
-    tint = Tint(server, robot, paths, load_props())
-    tint.follow(touching(state, "wrist_link", "cup"))
-    tint.follow(state)
-    assert not nodes(server)["/cup/contact0"].visible
 
 
 # trimesh has no types for materials.

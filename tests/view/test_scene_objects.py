@@ -19,7 +19,7 @@ from katana450.arm.control.objects.environment import Environment
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.solid import ObjectAppearance
-from katana450.arm.control.state.state import Finding, Reason, State
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -28,7 +28,6 @@ from katana450.extensions.importers.formats.mesh_file import read_mesh
 from katana450.extensions.objects.handles import HandlesLayer
 from katana450.maths.water.environment import TableTop
 from katana450.server.view.layer import LayerContext
-from katana450.server.view.paint import Tint
 from katana450.server.view.scene import COAT_THICKNESS, DETAIL, coarse, surface
 from katana450.server.view.scene_objects import SceneObjectNodes
 from tests.view.gestures import RecordedGestures
@@ -51,9 +50,8 @@ def mesh() -> Mesh:
     return read_mesh(painted.export(file_type="ply"), "it.ply")
 
 
-def seen(state: State, *objects: SceneObject, near: str = "") -> State:
-    findings = (Finding(Reason.CONTACT, 0.005, parts=(near, "finger")),) if near else ()
-    return replace(state, objects=objects, findings=findings)
+def seen(state: State, *objects: SceneObject) -> State:
+    return replace(state, objects=objects)
 
 
 def test_mesh_is_drawn_again_only_when_necessary(
@@ -89,21 +87,10 @@ def test_mesh_is_drawn_again_only_when_necessary(
     )
     assert not shown()
     nodes.follow(
-        seen(
-            state,
-            replace(scene_object, appearance=ObjectAppearance((4, 5, 6)), scale=1.5),
-            near="it",
-        )
-    )
-    assert shown()
-    coat = node("contact")
-    assert isinstance(coat, viser.MeshHandle)
-    assert (tuple(coat.color), coat.scale) == (Tint.COLOUR, 1.5)
-    assert shown(f"{PATH}/contact")
-    nodes.follow(
         seen(state, replace(scene_object, appearance=ObjectAppearance((4, 5, 6)), scale=1.5))
     )
-    assert not shown(f"{PATH}/contact")
+    assert shown()
+    assert one.scale == 1.5
     nodes.follow(seen(state))
     assert not [node for node in internals.nodes(server) if node.startswith(PATH)]
 

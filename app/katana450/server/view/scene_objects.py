@@ -18,7 +18,6 @@ from katana450.arm.robot.visual import Visual
 from katana450.maths.collision.engine import hull_triangles
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.server.view.paint import Tint
 from katana450.server.view.scene import Window
 from katana450.server.viser_bridge.posing import place, turn
 
@@ -27,9 +26,6 @@ COLOUR = (148, 163, 184)
 
 ZONE_COLOURS, ZONE_OPACITY = {Zone.KEEP_OUT: (239, 130, 20), Zone.SLOW: (250, 204, 21)}, 0.25
 """Colours of zones without a colour of their own, and their maximum opacity."""
-
-COAT_SCALE = 1.005
-"""Scale of a contact coat relative to its object, so that the two do not flicker."""
 
 PROPS = ("cup", "basin")
 """Objects whose nodes have their names."""
@@ -67,16 +63,13 @@ class SceneObjectNodes:
         self._seen: tuple[SceneObject, ...] = ()
 
     def follow(self, state: State) -> None:
-        """Show the objects of ``state``; those near a contact are coated."""
+        """Show the objects of ``state``."""
         changed = state.objects is not self._seen
         if changed:
             self._take_in(state.objects)
-        near = state.near
         for scene_object in state.objects:
             if changed or scene_object.carried:
                 self._pose(scene_object, state.x)
-            if scene_object.name not in PROPS:
-                self._shapes[scene_object.name].warn(scene_object, near=scene_object.name in near)
 
     def _take_in(self, objects: tuple[SceneObject, ...]) -> None:
         self._seen = objects
@@ -106,7 +99,7 @@ class SceneObjectNodes:
 
     def _take_away(self, name: str) -> None:
         if name in PROPS:
-            # `Tint` has nodes below this frame.
+            # It can come back, with the same node.
             self._frames[name].visible = False
             return
         del self._shapes[name]
@@ -120,8 +113,6 @@ class ObjectShape:
         """Prepare the shape below the node ``path``; ``props``: cup and basin."""
         self._scene = server.scene
         self._path = f"{path}/shape"
-        self._coat_path = f"{path}/contact"
-        self._coat: viser.MeshHandle | None = None
         self._meshes = meshes
         self._props = props
         self._node: Any = None
@@ -143,31 +134,10 @@ class ObjectShape:
         if now != self._is:
             self._is = now
             self._node = self._made(scene_object, own=own)
-            if self._coat is not None:
-                self._coat.remove()
-                self._coat = None
         if not own:
             _set(self._node, "color", _colour(scene_object))
             _set(self._node, "opacity", _opacity(scene_object))
         _set(self._node, "scale", self._scale(scene_object))
-
-    def warn(self, scene_object: SceneObject, *, near: bool) -> None:
-        """Coat the object with its convex body while the arm is ``near``."""
-        if self._coat is None and near:
-            body = _plain(scene_object) if scene_object.solid is None else _hull(scene_object.solid)
-            surface = _of(body)
-            self._coat = self._scene.add_mesh_simple(
-                self._coat_path,
-                (COAT_SCALE * surface.vertices).astype(np.float32),
-                surface.faces.astype(np.uint32),
-                color=Tint.COLOUR,
-                opacity=Tint.OPACITY,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-        if self._coat is not None:
-            _set(self._coat, "visible", near)
-            _set(self._coat, "scale", scene_object.scale)
 
     def _made(self, scene_object: SceneObject, *, own: bool) -> Any:
         # viser replaces the node of the name.

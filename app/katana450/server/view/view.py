@@ -25,7 +25,7 @@ from katana450.server.view.cameras import Cameras, initial_camera, scale_of
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import AddFolders, ViewLayer
-from katana450.server.view.paint import PaintNodes, Tint
+from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel import READOUT_INTERVAL, Panel
 from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
@@ -198,8 +198,6 @@ class View(ViewUpdater):
         props = load_props()
         self._scenery = Scenery(server, robot, session, props, gestures, meshes, layers)
         self._paint = PaintNodes(server, self._scenery.arm)
-        shown = None if robot.arm is None else props
-        self._tint = Tint(server, robot, self._scenery.arm.path, shown)
         self._ghosts: dict[str, GhostNodes] = {}
         self._tool: ToolNodes | None = None
         if robot.arm is not None:
@@ -235,7 +233,6 @@ class View(ViewUpdater):
         with self._server.atomic():
             self._scenery.show(state)
             self._paint.follow(state)
-            self._tint.follow(state)
             self._show_goal(state)
             self._cameras.follow(state)
         self._server.flush()

@@ -356,14 +356,6 @@ class State:
         return np.append(self.setpoint, self.gripper_setpoint)
 
     @property
-    def near(self) -> frozenset[str]:
-        """The links and objects that are about to touch."""
-        contact_parts = (
-            finding.parts for finding in self.findings if finding.reason is Reason.CONTACT
-        )
-        return frozenset(part for parts in contact_parts for part in parts or ())
-
-    @property
     def held(self) -> SceneObject | None:
         """The object that the fingers hold; None if there is none."""
         return next((scene_object for scene_object in self.objects if scene_object.held), None)
