@@ -1,4 +1,4 @@
-"""The elbow of seven axes moves while the tool rests: by an act and by a jog."""
+"""The elbow of seven axes moves while the tool rests: by an act, by a jog and in a script."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from katana450.arm.control.state.messages import sentence
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import Reason, State
 from katana450.assembly.robot_session import find_robot
-from katana450.errors import InputError
+from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import joint_frames
-from katana450.maths.motion.arm_angle import elbow_turn
+from katana450.maths.motion.arm_angle import elbow_postures, elbow_turn
 from katana450.settings import Settings
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.driven import begun, run, session_of
+from tests.general_arms.programs import played, program
 from tests.general_arms.published_arms import GEN3_7, PANDA, SEVEN, UR5E, XARM_7
 
 ARMS = {**SEVEN, "Gen3": GEN3_7, "xArm7": XARM_7}
@@ -85,9 +86,9 @@ def test_elbow_turns_by_an_angle_while_the_tool_rests(chain: Chain) -> None:
 def test_arm_angle_is_the_turn_of_the_elbow_about_the_line_from_shoulder_to_wrist() -> None:
     """The elbow of an iiwa is on its axis 4; shoulder and wrist are where three axes meet."""
     chain = SEVEN["iiwa"]
-    session = session_of(chain)
-    start, *_, end = states_of(session, begun(session), [cmd.TurnElbow(0.4)])
-    first, last = (joint_frames(chain, state.setpoint) for state in (start, end))
+    first, *_, last = (
+        joint_frames(chain, q) for q in elbow_postures(chain, session_of(chain).ready, 0.4)
+    )
     points = [np.cross(w, v) for w, v in zip(chain.S[:3].T, chain.S[3:].T, strict=True)]
     shoulder, wrist = points[1], (first[4] @ [*points[5], 1.0])[:3]
     line = (wrist - shoulder) / np.linalg.norm(wrist - shoulder)
@@ -144,11 +145,11 @@ def test_elbow_keeps_clear_of_a_ball_beside_it(tmp_path: Path) -> None:
     session = find_robot(Settings(), path, None).session
     chain = session.require_arm().chain
     # The ball lies where the elbow comes to.
-    *_, end = states_of(session, session.begin(session.ready, 0.0, 0.0), [cmd.TurnElbow(0.5)])
+    *_, end = elbow_postures(chain, session.ready, 0.5)
     w, v = np.split(chain.S[:, 3], 2)
     T_base_shoulder = np.eye(4)
     T_base_shoulder[2, 3] = 0.333
-    elbow = T_base_shoulder @ joint_frames(chain, end.setpoint)[3] @ [*np.cross(w, v), 1.0]
+    elbow = T_base_shoulder @ joint_frames(chain, end)[3] @ [*np.cross(w, v), 1.0]
     T = se3.from_rotation_translation(np.eye(3), elbow[:3])
     ball = SceneObject("ball", Shape.SPHERE, (0.03,), T)
     start = run(session, session.begin(session.ready, 0.0, 0.0), [cmd.PlaceObject(ball)])
@@ -178,3 +179,17 @@ def test_turn_that_the_arm_cannot_do_is_refused_with_the_reason() -> None:
             session.step(begun(session), [command], 0.01)
     with pytest.raises(InputError, match="not both"):
         cmd.Jog(UP + 0.1)
+    with pytest.raises(KatanaError, match="takes seven turning axes"):
+        program(UR5E, "turn_elbow: 20")
+    with pytest.raises(
+        KatanaError, match=r"Axis 2 comes to its limit of -101.0 deg after 10\d of 170"
+    ):
+        program(PANDA, "turn_elbow: 170")
+
+
+@pytest.mark.cases(1)
+@pytest.mark.parametrize("chain", ARMS.values(), ids=ARMS)
+def test_script_turns_the_elbow_while_the_tool_rests(chain: Chain) -> None:
+    states = played(chain, program(chain, "turn_elbow: 20 deg"))
+    check_tool_rests(session_of(chain), states)
+    assert turned(chain, states) == pytest.approx(math.radians(20.0), abs=1e-5)

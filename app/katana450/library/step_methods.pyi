@@ -258,6 +258,13 @@ class StepMethods:
             through: Rows of a time, s, and all angles, deg.
         """
 
+    def turn_elbow(self, by: float | str) -> None:
+        """Turn the elbow of seven axes about the line from shoulder to wrist; the tool rests.
+
+        Args:
+            by: deg, or a text such as 0.5 rad.
+        """
+
     def via(
         self,
         through: Sequence[Any] | npt.NDArray[Any] | str,

@@ -219,13 +219,13 @@ class PoseEquations:
         return (x, y, z), moved[:3], moved[3:][::-1]  # type: ignore[return-value]
 
 
-def equations_from(solver: Kinematics, q: FloatArray) -> PoseEquations:
+def equations_from(solver: Kinematics, q: FloatArray, joint: int | None = None) -> PoseEquations:
     """Return the equations of a path of the tool that begins at `q` (n,) [rad].
 
-    Of more than six axes the one that sets the arm angle is locked, or the joints without which the
-    others move the tool best.
+    Of more than six axes ``joint`` is locked, or the one that sets the arm angle, or the joints
+    without which the others move the tool best.
     """
-    locked = solver.arm_angle_joint
+    locked = solver.arm_angle_joint if joint is None else joint
     equations = PoseEquations(descent_of(solver), () if locked is None else (locked,))
     while len(equations.free) > 6:
         rest = [replace(equations, locked=(*equations.locked, k)) for k in equations.free]

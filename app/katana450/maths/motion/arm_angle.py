@@ -11,6 +11,7 @@ Journal of Robotics Research 11 (1992).
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Final, NamedTuple
 
@@ -38,6 +39,9 @@ LEAST_TURN: Final = 0.02
 
 PROBE: Final = 1e-4
 """[rad] Length of the motion of the joints by which derivatives are measured."""
+
+STEP: Final = 0.02
+"""[rad] Step of the arm angle between two postures of `elbow_postures`."""
 
 
 class SelfMotion(NamedTuple):
@@ -144,6 +148,27 @@ def elbow_points(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray, F
     points = zip(frames, _points(chain), strict=True)
     shoulder, elbow, wrist = (T[:3, :3] @ point + T[:3, 3] for T, point in points)
     return shoulder, elbow, wrist
+
+
+def elbow_postures(chain: Chain, q: FloatArray, by: float) -> Iterator[FloatArray]:
+    """Yield the joint angles (7,) [rad] at steps of the arm angle from `q` (7,) to a turn ``by``.
+
+    The tool rests, but for the error of the method of Runge and Kutta, below 1e-6 m. The last is at
+    ``by`` [rad]; it is missing, with those before it, where the elbow turns no farther.
+    """
+    count = int(np.ceil(abs(by) / STEP))
+    h = by / max(count, 1)
+    yield q
+    for _ in range(count):
+        rates: list[FloatArray] = []
+        for part in (0.0, 0.5, 0.5, 1.0):
+            after = q + part * h * rates[-1] if rates else q
+            motion = self_motion(chain, after)
+            if motion.turn < LEAST_TURN or motion.least < LEAST_REGULAR:
+                return
+            rates.append(motion.v / motion.turn)
+        q = q + h / 6.0 * (rates[0] + 2.0 * (rates[1] + rates[2]) + rates[3])
+        yield q
 
 
 def _shoulder_to_wrist(chain: Chain, q: FloatArray) -> FloatArray:

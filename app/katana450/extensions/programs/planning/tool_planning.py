@@ -15,13 +15,15 @@ from typing import Final
 
 import numpy as np
 
+from katana450 import tolerances
+from katana450.arm.control.session.checks import NO_ARM_ANGLE
 from katana450.arm.control.state.state import State
 from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError, PathError
 from katana450.extensions.general_arms.pose_equations import PoseEquations, equations_from
 from katana450.extensions.programs.language.scope import Angles
 from katana450.extensions.programs.planning.curve_path import CurveSearch, ToolPath
-from katana450.extensions.programs.planning.curves import Curve
+from katana450.extensions.programs.planning.curves import Curve, line_between
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
@@ -30,6 +32,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.motion.arm_angle import STEP, elbow_postures
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path
 
@@ -44,6 +47,12 @@ VERTICAL: Final = 1e-6
 
 SWINGS: Final = tuple(np.radians((15, -15, 30, -30, 60, -60, 90, -90)).tolist())
 """[rad] Turns of the arm angle along a path, in the order in which they are tried."""
+
+LEAST_STEADY: Final = 0.25
+"""[1] Least part of the joint that leads a path of the elbow in the motion of all joints."""
+
+ELBOW_SLACK: Final = 1e-6
+"""[deg] Turn of the elbow that counts as none."""
 
 PROBES: Final = (1.0, 0.75, 0.5, 0.25)
 """Places of a curve at which the reach is tried before the arm angle is turned."""
@@ -66,9 +75,9 @@ class ToolPlanning:
         """True for the closed form of five axes; other arms solve equations along a curve."""
         return self.kinematics.is_pitched
 
-    def equations(self, q: FloatArray) -> PoseEquations:
-        """Return `equations_from` the joint angles `q`."""
-        return equations_from(self.kinematics.solver, q)
+    def equations(self, q: FloatArray, joint: int | None = None) -> PoseEquations:
+        """Return `equations_from` the joint angles `q`, with ``joint`` locked."""
+        return equations_from(self.kinematics.solver, q, joint)
 
     @property
     def priorities(self) -> tuple[Priority, Priority]:
@@ -301,3 +310,71 @@ class ToolPlanning:
         if max(start.apart(places[0])) <= EXACT:
             return False
         return all(self.on_branch(q, place, branch) is not None for place in places)
+
+    def elbow_paths(self, q: FloatArray, by: float) -> list[Path]:
+        """Return the joint paths, one after another, on which the elbow turns and the tool rests.
+
+        On each one joint turns evenly, and the others follow from the pose.
+
+        Args:
+            q: joint angles (7,) at the start [rad].
+            by: change of the arm angle [rad].
+
+        Raises:
+            InputError: the arm has no arm angle, or the elbow cannot turn so far.
+        """
+        if not self.kinematics.turns_elbow:
+            raise InputError(NO_ARM_ANGLE)
+        postures = np.array(list(elbow_postures(self.chain, q, by)))
+        self._refuse_elbow(postures, by)
+        curve = line_between(self.at(q), self.at(q))
+        paths: list[Path] = []
+        for last, joint in _steady_joints(np.diff(postures, axis=0)):
+            slope = np.array((postures[last, joint] - q[joint],))
+            try:
+                paths.append(CurveSearch(self.equations(q, joint), curve, q, slope).path())
+            except PathError as error:
+                raise InputError(
+                    "The elbow comes to a singularity on its path, where more joints can turn "
+                    "while the tool rests. Turn it by less, or move the tool first."
+                ) from error
+            q = paths[-1].end
+        return paths
+
+    def _refuse_elbow(self, postures: FloatArray, by: float) -> None:
+        """Raise InputError if ``postures`` (N, 7) [rad] leave the limits or end before ``by``."""
+        chain, whole = self.chain, math.degrees(by)
+        turned = np.arange(len(postures)) / max(1, math.ceil(abs(by) / STEP)) * whole
+        beyond = np.maximum(chain.lower - postures, postures - chain.upper)
+        outside = np.flatnonzero(beyond.max(axis=1) > tolerances.LIMIT_SLACK)
+        if outside.size:
+            place = int(outside[0])
+            axis = int(beyond[place].argmax())
+            limits = float(chain.lower[axis]), float(chain.upper[axis])
+            limit = min(limits, key=lambda end: abs(end - float(postures[place, axis])))
+            raise InputError(
+                f"Axis {axis + 1} comes to its limit of {math.degrees(limit):.1f} deg after "
+                f"{abs(turned[max(place - 1, 0)]):.0f} of {abs(whole):.4g} deg. Turn the elbow by "
+                "less."
+            )
+        if abs(turned[-1]) < abs(whole) - ELBOW_SLACK:
+            raise InputError(
+                f"The elbow turns no farther than {abs(turned[-1]):.3g} of {abs(whole):.4g} deg "
+                "while the tool rests. Turn it by less, or move the tool first."
+            )
+
+
+def _steady_joints(steps: FloatArray) -> Iterator[tuple[int, int]]:
+    """Yield the end of each part of a path, counted in ``steps`` (N, 7), and a joint for it.
+
+    The joint turns in one direction in the whole part, and by enough. No other does so for longer.
+    """
+    last = 0
+    while last < len(steps):
+        rest = steps[last:]
+        parts = rest / np.linalg.norm(rest, axis=1, keepdims=True)
+        steady = parts * np.sign(rest[0]) >= LEAST_STEADY
+        lengths = np.where(steady.all(axis=0), len(rest), steady.argmin(axis=0))
+        joint = int(lengths.argmax())
+        last += max(1, int(lengths[joint]))
+        yield last, joint

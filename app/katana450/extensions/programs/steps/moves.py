@@ -96,6 +96,19 @@ class Nudge(Step, word="nudge"):
 
 
 @dataclass(frozen=True)
+class TurnElbow(Step, word="turn_elbow"):
+    """Turn the elbow of seven axes about the line from shoulder to wrist; the tool rests."""
+
+    short = "by"
+
+    by: Annotated[float, kinds.angle(-360.0, 360.0)]
+
+    def build(self, plan: PlanState) -> PlanState:
+        """Plan the motion. Raises InputError if the elbow cannot turn so far."""
+        return plan.follow(plan.planning.elbow_paths(plan.q, self.by), "turn_elbow")
+
+
+@dataclass(frozen=True)
 class Home(Step, word="home"):
     """Move to the ready posture."""
 
