@@ -79,6 +79,15 @@ def test_goals_that_change_at_any_tick_keep_the_limits(limiter: Limiter) -> None
         motion = after
 
 
+def test_motion_that_is_too_fast_for_a_limit_stops_before_it_goes_on(limiter: Limiter) -> None:
+    q, qd = np.zeros(5), np.zeros(5)
+    q[0], qd[0] = LIMITS.upper[0] - 0.01, LIMITS.speed[0]
+    motion = JointMotion(q, qd, np.zeros(5))
+    after, stopped = limiter.towards(motion, LIMITS.lower, DT), limiter.stop(motion, DT)
+    np.testing.assert_array_equal(after.q, stopped.q)
+    np.testing.assert_array_equal(after.qd, stopped.qd)
+
+
 def test_stop_is_the_fastest_within_limits(limiter: Limiter) -> None:
     rng = np.random.default_rng(3)
     for _ in range(30):

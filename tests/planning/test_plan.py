@@ -16,7 +16,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.errors import BlockedError, InputError
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.shape import box, half_space
-from katana450.maths.collision.world import CollisionWorld, obstacle
+from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
@@ -70,6 +70,20 @@ def test_a_wall_thinner_than_any_step_is_not_passed(arm: ArmModel, world: Collis
     assert min(contact.distance for contact in near if contact is not None) < MARGIN
     tools = np.array([1e3 * forward(arm.chain, x[:5])[:3, 3] for x in places])
     assert np.abs(tools - point).max(axis=1).min() < 3.0
+
+
+def test_far_turn_is_looked_at_in_places_that_a_bound_holds_for(world: CollisionWorld) -> None:
+    start = np.radians([90.0, -90.0, 0.0, 0.0, -140.0, 0.0])
+    line, places = np.radians([0.0, 0.0, 0.0, 0.0, 280.0, 0.0]), []
+
+    def posture_at(fraction: float) -> FloatArray:
+        places.append(fraction)
+        return np.asarray(start + fraction * line)
+
+    room = SweptClearance.about(world, 1e-3, start)
+    assert room.blocked(posture_at, lambda a, b: (b - a) * np.abs(line)) is None
+    turns = np.diff([0.0, *sorted(places), 1.0]) * np.abs(line).sum()
+    assert turns.max() < 2.0 * MAX_PATH_LENGTH
 
 
 def test_the_nearest_clearance_is_that_of_brute_force(arm: ArmModel, world: CollisionWorld) -> None:

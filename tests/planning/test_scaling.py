@@ -15,7 +15,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.errors import InputError
 from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import ToolLines
-from katana450.maths.planning.pacing import fastest
+from katana450.maths.planning.pacing import SampledPath, fastest
 from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
 from katana450.maths.planning.scaling import Bounds, Scaling, motion_after, rest_to_rest
 from tests.planning.time_optimal import least_time
@@ -73,6 +73,18 @@ def test_limits_hold_at_a_small_corner(bounds: Bounds, paths: dict[str, Path]) -
     sharp = replace(lines.curve, blend=np.array([0.02, 0.05, 1.0]))
     path = ToolPath(lines.chain, sharp, lines.branch, lines.near)
     assert loads(path, fastest(path, bounds), bounds).max() <= 1.0
+
+
+@pytest.mark.parametrize("name", ["circle", "joints"])
+def test_slowness_that_changes_much_keeps_the_limits(
+    paths: dict[str, Path], bounds: Bounds, name: str
+) -> None:
+    sampled, rng = SampledPath.of(paths[name], bounds), np.random.default_rng(4)
+    for _ in range(3):
+        waves = np.exp(rng.uniform(-1.0, 1.0, len(sampled.first) + 3))
+        slowness = np.convolve(np.pad(waves, 1, mode="edge"), (0.25, 0.5, 0.25), "valid")
+        scaling = Scaling(slowness * sampled.excess(slowness, 1.0, 10.0).max(), 1.0, 10.0)
+        assert 0.98 < loads(paths[name], scaling, bounds).max() <= 1.0
 
 
 @pytest.mark.cases(2)

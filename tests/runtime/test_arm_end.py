@@ -162,6 +162,16 @@ def test_unsupported_command_is_refused_before_the_pipe(ends: Ends) -> None:
     assert ends.front.last_ticket == 0
 
 
+def test_arm_that_hangs_gets_no_command_but_stop(
+    ends: Ends, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FrontEnd, "age", 0.6)
+    with pytest.raises(InputError, match=r"not answered for 0\.6 s: only STOP"):
+        ends.front.deliver(cmd.Joint(1, 0.1))
+    ends.front.deliver(cmd.Stop())
+    until(lambda: ends.loop.state_publisher.snapshot.state.stopped is not None)
+
+
 def test_ticket_of_a_dropped_command_still_advances(ends: Ends) -> None:
     for _ in range(3000):
         ends.front.deliver(cmd.Home())
