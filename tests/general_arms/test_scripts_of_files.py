@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from katana450.extensions.programs.run.simulation import plan_script, run_by_clo
 from katana450.extensions.programs.script.script import parse, script_schema
 from katana450.extensions.programs.script.script_files import script_text
 from katana450.extensions.programs.server.preview import PreviewNodes
-from katana450.extensions.programs.server.traces import Traces, coloured
+from katana450.extensions.programs.server.traces import TracesLayer, coloured
 from katana450.maths.kinematics.chain import Chain
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.links_of_arms import ur5e
@@ -50,7 +52,9 @@ def test_preview_and_trace_show_the_curves(server: viser.ViserServer, ur5e_file:
     preview.look(0.5 * span)
     for thread in [candidate for candidate in threading.enumerate() if candidate.name == "preview"]:
         thread.join(30.0)
-    traces = Traces(server, plan.robot.require_arm())
+    traces = TracesLayer()
+    context: Any = SimpleNamespace(server=server, robot=plan.robot)
+    traces.attach(context)
     for state in states:
         traces.follow(state)
     nodes = internals.nodes(server)

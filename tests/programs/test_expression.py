@@ -17,7 +17,6 @@ from katana450.extensions.programs.language.expression import (
     TIME,
     ExpressionError,
     Quantity,
-    UnknownNameError,
     evaluate,
 )
 
@@ -98,7 +97,7 @@ def test_expression_is_refused(text: str, said: str) -> None:
 
 
 def test_unknown_name_is_named() -> None:
-    with pytest.raises(UnknownNameError, match="'radios'"):
+    with pytest.raises(ExpressionError, match="'radios'"):
         evaluate("radios * 2", NAMES)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import viser
@@ -17,7 +19,7 @@ from katana450.extensions.programs.server.traces import (
     BAD_COLOUR,
     GOOD_COLOUR,
     WORST_ERROR,
-    Traces,
+    TracesLayer,
     coloured,
 )
 from katana450.maths.kinematics.branch import branch_of
@@ -33,7 +35,10 @@ def test_trace_follows_the_arc(server: viser.ViserServer, arm: MountedArm) -> No
     arc = ToolArc(target.position, centre, np.array((1.0, 0.0, 0.0)), math.tau,
                   Linear(target.pitch, target.pitch), Linear(0.0, 0.0))  # fmt: skip
     path = ToolPath(arm.chain, arc, branch_of(arm.chain, session.ready), session.ready)
-    traces = Traces(server, arm)
+    traces = TracesLayer()
+    robot: Any = SimpleNamespace(require_arm=lambda: arm)
+    context: Any = SimpleNamespace(server=server, robot=robot)
+    traces.attach(context)
     traced = traces._traced
 
     def is_shown() -> bool:

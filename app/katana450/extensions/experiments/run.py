@@ -46,12 +46,6 @@ from katana450.server.api.program_requests import ProgramOrder, Steer
 from katana450.settings import Settings
 
 
-def print_problems(error: ScriptError, source: str) -> None:
-    """Print each problem with its line and column; ``source`` names the script."""
-    for problem in error.problems:
-        print(f"{source}:{problem.line}:{problem.column}: {problem.text}", file=sys.stderr)
-
-
 def run(options: Namespace) -> int:
     """Execute ``katana450 run``; return the exit status."""
     try:
@@ -63,7 +57,9 @@ def run(options: Namespace) -> int:
                 return status
         return run_live(text, script, options)
     except ScriptError as error:
-        print_problems(error, str(options.file))
+        for problem in error.problems:
+            place = f"{options.file}:{problem.line}:{problem.column}"
+            print(f"{place}: {problem.text}", file=sys.stderr)
         return 1
 
 
@@ -82,10 +78,7 @@ def simulate(script: Script, options: Namespace) -> int:
 
     Returns the exit status. Raises ScriptError and KatanaError.
     """
-    scene = options.scene
-    if scene is None and script.scene is not None:
-        # The file of the script, whose folder has the meshes of its scene.
-        scene = options.file
+    scene = _scene_file(script, options)
     begin = ready if scene is None else partial(_begin, scene=scene)
     plan = plan_script(script, options.urdf, options.seed, options.speed, begin)
     program, robot = plan.program, plan.robot
@@ -130,6 +123,13 @@ def simulate(script: Script, options: Namespace) -> int:
     for bound in report.missed:
         print(f"katana450: a bound is not met: {bound}", file=sys.stderr)
     return 1 if report.missed else 0
+
+
+def _scene_file(script: Script, options: Namespace) -> Path | None:
+    """Return the file of the scene, which may be the script; None for the scene of the server."""
+    # The folder of a script has the meshes of its scene.
+    own = None if script.scene is None else options.file
+    return own if options.scene is None else options.scene
 
 
 def _begin(session: Session, scene: Path) -> State:
@@ -267,11 +267,7 @@ def _server_at(script: Script, options: Namespace) -> Iterator[str]:
         command.append("--bare")
     if options.plant is not None:
         command += ["--plant", options.plant]
-    scene = options.scene
-    if scene is None and script.scene is not None:
-        # The file of the script, whose folder has the meshes of its scene.
-        scene = options.file
-    if scene is not None:
+    if (scene := _scene_file(script, options)) is not None:
         command += ["--scene", str(scene)]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **without_interrupts())
     try:

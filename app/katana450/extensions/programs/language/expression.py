@@ -38,10 +38,6 @@ class ExpressionError(ValueError):
     """An expression without a value, with the reason."""
 
 
-class UnknownNameError(ExpressionError):
-    """An expression with a name that has no value."""
-
-
 @dataclass(frozen=True)
 class Quantity:
     """A number and its kind.
@@ -56,12 +52,7 @@ class Quantity:
 
 
 def evaluate(text: str, names: Mapping[str, Quantity]) -> Quantity:
-    """Return the value of the expression ``text``, in which ``names`` stand for quantities.
-
-    Raises:
-        UnknownNameError: a name has no value.
-        ExpressionError: it is not an expression, or has no finite value.
-    """
+    """Return the value of ``text`` with ``names`` for quantities. Raises ExpressionError."""
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"an expression has at most {MAX_LENGTH} characters")
     try:
@@ -87,13 +78,13 @@ def _value(node: ast.expr, names: Mapping[str, Quantity]) -> Quantity:
                 return names[name]
             if name == "pi":
                 return Quantity(math.pi)
-            raise UnknownNameError(f"there is no value {name!r}")
+            raise ExpressionError(f"there is no value {name!r}")
         case (
             ast.Attribute(value=ast.Name(id=name), attr=part)
             | ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=int() as part))
         ):
             if f"{name}.{part}" not in names:
-                raise UnknownNameError(f"there is no value {ast.unparse(node)!r}")
+                raise ExpressionError(f"there is no value {ast.unparse(node)!r}")
             return names[f"{name}.{part}"]
         case ast.UnaryOp(op=ast.USub() | ast.UAdd() as op, operand=inner):
             quantity = _value(inner, names)
@@ -170,7 +161,7 @@ FUNCTIONS = (*OF_ANGLE, *TO_ANGLE, *KEEPING, *OF_MANY, "sqrt", "atan2")
 
 def _call(name: str, values: list[Quantity]) -> Quantity:
     if name not in FUNCTIONS:
-        raise UnknownNameError(f"there is no function {name!r}; there are {', '.join(FUNCTIONS)}")
+        raise ExpressionError(f"there is no function {name!r}; there are {', '.join(FUNCTIONS)}")
     numbers = [quantity.value for quantity in values]
     if name in OF_MANY and values:
         kind = values[0]

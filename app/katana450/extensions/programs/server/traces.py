@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-import viser
 
 from katana450.arm.control.state.modes import Jogging, Positioning, Servoing, Tracking
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.arm_reader import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.jet import Jet
@@ -41,27 +39,16 @@ Colours = npt.NDArray[np.uint8]
 
 
 class TracesLayer(ViewLayer):
-    """The trace as a layer of the scene, without controls."""
-
-    def attach(self, context: LayerContext) -> None:
-        """Add the hidden node."""
-        self._traces = Traces(context.server, context.robot.require_arm())
-
-    def follow(self, state: State) -> None:
-        """Extend the trace by ``state``."""
-        self._traces.follow(state)
-
-
-class Traces:
     """The trace of the last plan with a tool path, until the arm is driven otherwise.
 
     The preview draws the path itself. Nothing is sent of an arm at rest.
     """
 
-    def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
-        self._T_base_shoulder = arm.T_base_shoulder
+    def attach(self, context: LayerContext) -> None:
+        """Add the hidden node."""
+        self._T_base_shoulder = context.robot.require_arm().T_base_shoulder
         points, colours = (np.zeros((1, 2, 3), dtype=kind) for kind in (np.float32, np.uint8))
-        self._traced = server.scene.add_line_segments(
+        self._traced = context.server.scene.add_line_segments(
             "/path/traced", points, colours, thickness=0.006, visible=False
         )
         self._plan: Plan | None = None
@@ -86,7 +73,8 @@ class Traces:
         point = forward(path.chain, state.q)[:3, 3]
         sigma = following.segment.scaling.pace(following.local).sigma
         desired = np.array([coordinate.c0 for coordinate in path.curve.at(Jet.variable(sigma))[:3]])
-        in_base = self._in_base(point)
+        T = self._T_base_shoulder
+        in_base = np.asarray(T[:3, :3] @ point + T[:3, 3])
         if not self._points or float(np.abs(in_base - self._points[-1]).max()) > 0.0:
             self._points.append(in_base)
             self._errors.append(float(np.linalg.norm(point - desired)))
@@ -100,11 +88,6 @@ class Traces:
         if any(isinstance(segment.path, CurvePath) for segment in plan.segments):
             self._points, self._errors, self._shown = [], [], 0
             self._traced.visible = False
-
-    def _in_base(self, point: FloatArray) -> FloatArray:
-        """Return ``point`` (3,) [m], given in {S}, in the base frame."""
-        T = self._T_base_shoulder
-        return np.asarray(T[:3, :3] @ point + T[:3, 3])
 
     def _show(self) -> None:
         if len(self._points) < 2 or len(self._points) == self._shown:
