@@ -116,7 +116,8 @@ declare namespace Api {
   type ProgramOrder = "continue" | "end" | "pause" | "resume" | "run" | "step";
   interface ProgramPlan { is: "program_plan"; id?: number | string | null; text?: string; program?: Progress | null;
     steps?: ProgramStep[]; seconds?: number; look?: number; }
-  interface ProgramStep { name: string; seconds: number; mark: string; }
+  interface ProgramStep { name: string; seconds: number; mark: string; predicted: boolean; line: number; column: number;
+    }
   interface Progress { name: string; by: string; status: string; step: number; steps: number; line: number;
     task: string; fraction: number; seconds: number; seconds_left: number; why: string; skipped: number[];
     unattended: boolean; began: string | null; breakpoints: number[]; can_continue: boolean; }

@@ -21,7 +21,6 @@ from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.extensions.programs.server.page_state import (
-    ListedStep,
     marks,
     planned_steps,
     steps_of,
@@ -30,7 +29,7 @@ from katana450.extensions.programs.server.preview import PreviewNodes, ProgramPr
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.water import WORTH_SHOWING
 from katana450.resources import URDF_PATH
-from katana450.server.api.answers import Progress
+from katana450.server.api.answers import ProgramStep, Progress
 from katana450.settings import Settings
 from tests.viser_bridge.internals import nodes
 
@@ -57,14 +56,15 @@ class Runner:
     ],
 )
 def test_list_marks_what_is_done_current_and_next(status: str, words: list[str]) -> None:
-    steps = tuple(ListedStep(name, 1.0) for name in "abcde")
+    steps = tuple(ProgramStep(name=name, seconds=1.0) for name in "abcde")
     progress = Progress(name="x", by="me", status=status, step=3, steps=5, skipped=(2,))
     assert list(marks(steps, progress, 2.5)) == words
     assert set(marks(steps, progress, 0.0)) <= {*words, ""}
 
 
 def test_step_that_is_not_expected_is_not_next() -> None:
-    steps = (ListedStep("if", 0.0), ListedStep("then: a", 1.0, False), ListedStep("b", 1.0))
+    then = ProgramStep(name="then: a", seconds=1.0, predicted=False)
+    steps = (ProgramStep(name="if", seconds=0.0), then, ProgramStep(name="b", seconds=1.0))
     at_if = Progress(name="x", by="me", status="running", step=1, steps=3)
     assert marks(steps, at_if, 0.0) == ("now", "", "next")
 

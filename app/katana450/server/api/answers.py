@@ -99,11 +99,17 @@ class ProgramStep(msgspec.Struct, frozen=True, kw_only=True):
         seconds: Its expected duration [s]; 0 if it is not expected to run.
         mark: done, now, next, ended here or skipped while the program runs and afterwards; before
             that, shown for the step at the time that is looked at; "" for all others.
+        predicted: Whether it is executed if all is as predicted.
+        line: Line of the text at which it begins, from 1.
+        column: Column there, from 1.
     """
 
     name: str
     seconds: float
-    mark: str
+    mark: str = ""
+    predicted: bool = True
+    line: int = 1
+    column: int = 1
 
 
 class ProgramPlan(Answer, frozen=True, kw_only=True):

@@ -176,19 +176,18 @@ def count(steps: Iterable[LocatedStep]) -> int:
     )
 
 
-def titles(steps: Iterable[LocatedStep], before: str = "") -> Iterator[str]:
-    """Yield the name of each of ``steps`` for people, with those of all alternatives.
+def titles(steps: Iterable[LocatedStep], before: str = "") -> Iterator[tuple[str, int, int]]:
+    """Yield name for people, line and column of each of ``steps``, also of all alternatives.
 
     ``before``: what is before each name.
     """
-    for located in steps:
-        step = located.step
+    for step, line, column in steps:
         if isinstance(step, Conditional):
-            yield f"{before}if {step.condition.words}"
+            yield f"{before}if {step.condition.words}", line, column
             yield from titles(step.then, "then: ")
             yield from titles(step.otherwise, "else: ")
         else:
-            yield f"{before}{step.title}"
+            yield f"{before}{step.title}", line, column
 
 
 class NumberedStep(NamedTuple):

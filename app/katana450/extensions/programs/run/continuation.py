@@ -97,7 +97,7 @@ def continued(interruption: Interruption, plan_context: PlanContext, state: Stat
             tau = _nearest(action.plan, run.tau, state.setpoint)
         q = action.plan.q(tau)
         action = replace(action, tau=tau)
-    step = program.titles[task.number]
+    step = program.titles[task.number][0]
     added = [replace(task, name=f"{step}: speed", action=run.speed, after=None)]
     if interruption.situation.tool not in ("", state.tool):
         tool = use_tool(interruption.situation.tool)

@@ -61,7 +61,7 @@ class Program:
         start: (5,) posture [rad] from which the program must start.
         tasks: the actions in the order of their execution. Those of an ``if`` jump forward. Steps
             after an ``if`` are there once for each situation in which they are planned.
-        titles: names of the steps of the script, with those of all alternatives.
+        titles: name, line and column of each step of the script, also of all alternatives.
         alternatives: the alternatives of each ``if``, in their order.
         first: index of the task with which a run begins.
     """
@@ -70,7 +70,7 @@ class Program:
     speed: float
     start: FloatArray
     tasks: tuple[Task, ...]
-    titles: tuple[str, ...]
+    titles: tuple[tuple[str, int, int], ...]
     alternatives: tuple[Alternatives, ...] = ()
     first: int = 0
 

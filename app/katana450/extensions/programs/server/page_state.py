@@ -7,6 +7,8 @@ from bisect import bisect_right
 from itertools import accumulate
 from typing import NamedTuple
 
+import msgspec
+
 from katana450.arm.control.lease import Person
 from katana450.arm.control.state.state import State
 from katana450.extensions.programs.building.actions import expected_time
@@ -156,32 +158,17 @@ DONE, NOW, NEXT, ENDED_HERE, SKIPPED = "done", "now", "next", "ended here", "ski
 """Marks of steps during a run and after it."""
 
 
-class ListedStep(NamedTuple):
-    """A step of a program.
-
-    Attributes:
-        name: its name.
-        seconds: its expected duration [s].
-        predicted: whether it is executed if all is as predicted.
-    """
-
-    name: str
-    seconds: float
-    predicted: bool = True
-
-
 def planned_steps(
-    steps: tuple[ListedStep, ...], progress: Progress | None, look: float
+    steps: tuple[ProgramStep, ...], progress: Progress | None, look: float
 ) -> tuple[ProgramStep, ...]:
-    """Return ``steps`` as the answer `program_plan` has them; see ``marks``."""
+    """Return ``steps`` with their marks; see ``marks``."""
     words = marks(steps, progress, look)
     return tuple(
-        ProgramStep(name=step.name, seconds=step.seconds, mark=word)
-        for step, word in zip(steps, words, strict=True)
+        msgspec.structs.replace(step, mark=word) for step, word in zip(steps, words, strict=True)
     )
 
 
-def steps_of(program: Program) -> tuple[ListedStep, ...]:
+def steps_of(program: Program) -> tuple[ProgramStep, ...]:
     """Return the steps of ``program`` in their order, with those of all alternatives."""
     seconds = [0.0] * program.steps
     times = {task.number: task.end - task.begin for task in program.schedule}
@@ -197,12 +184,20 @@ def steps_of(program: Program) -> tuple[ListedStep, ...]:
         last[step] = number
         seconds[step] += times.get(number, expected_time(task.action, program.speed))
     return tuple(
-        ListedStep(title, seconds[step], step in expected)
-        for step, title in enumerate(program.titles)
+        ProgramStep(
+            name=name,
+            seconds=seconds[step],
+            predicted=step in expected,
+            line=line,
+            column=column,
+        )
+        for step, (name, line, column) in enumerate(program.titles)
     )
 
 
-def marks(steps: tuple[ListedStep, ...], progress: Progress | None, look: float) -> tuple[str, ...]:
+def marks(
+    steps: tuple[ProgramStep, ...], progress: Progress | None, look: float
+) -> tuple[str, ...]:
     """Return the mark of each step; "" for none.
 
     ``look`` is the time of the preview that is looked at [s]; 0 for none.
