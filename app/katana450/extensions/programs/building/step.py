@@ -118,9 +118,10 @@ class Step(Declared):
 
     word: ClassVar[str] = ""
 
-    def __init_subclass__(cls, word: str = "", **options: Any) -> None:
+    def __init_subclass__(cls, word: str = "", example: str | None = None, **options: Any) -> None:
         """Enter the class as the step ``word``, which is also its noun in messages."""
         super().__init_subclass__(**options)
+        cls.example = example
         if word:
             STEPS[word], cls.word = cls, word
             if "noun" not in vars(cls):

@@ -165,12 +165,14 @@ class Declared:
             is declared, there is no mapping.
         needs: names of fields of which at least one must be given.
         excludes: names of two fields that exclude each other.
+        example: a valid value as text, which the page offers; None to offer none.
     """
 
     noun: ClassVar[str] = ""
     short: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
     excludes: ClassVar[tuple[str, ...]] = ()
+    example: ClassVar[str | None] = None
 
     @classmethod
     def read(cls, value: YamlValue, context: ScriptContext) -> Self:

@@ -97,9 +97,8 @@ def _read_step(item: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ..
         if count(steps) > MAX_STEPS:
             raise name.wrong(f"This gives {count(steps)} steps; the maximum is {MAX_STEPS}.")
         return steps
-    known = (*STEPS, *BLOCKS)
-    if name.held not in known:
-        raise name.wrong(f"There is no step {name}{or_known(word, known)}")
+    if name.held not in KNOWN_STEPS:
+        raise name.wrong(f"There is no step {name}{or_known(word, KNOWN_STEPS)}")
     value = context.scope.bound(value)
     return _located(name, STEPS[word].read(value, context))
 
@@ -144,6 +143,7 @@ class Repeat(StepBlock):
     """Repeat steps."""
 
     noun = "a repeat"
+    example = "\n    times: 2\n    steps:\n      - wait: 1"
     excludes = ("until", "index")
 
     times: Annotated[int, bound(TIMES)]
@@ -174,6 +174,7 @@ class ForEach(StepBlock):
     """Do steps once for each value of a list."""
 
     noun = "a for_each"
+    example = "\n    name: up\n    in: [20, -20]\n    steps:\n      - line: {by: {z: up}}"
 
     name: Annotated[YamlValue, WORD.about("Name of the value in the steps")]
     values: Annotated[tuple[YamlValue, ...], bound(VALUES).named("in")]
@@ -204,6 +205,7 @@ class If(StepBlock):
     """Steps that depend on one condition, which is measured when the step is reached."""
 
     noun = "an if"
+    example = "\n    held: cup\n    then:\n      - wait: 1\n    else:\n      - home"
 
     condition: Annotated[Condition, CHOICE]
     then: Annotated[tuple[LocatedStep, ...], INNER_STEPS.about("Steps if the condition holds")]
@@ -218,6 +220,15 @@ class If(StepBlock):
 
 BLOCKS: dict[str, type[StepBlock]] = {"repeat": Repeat, "for_each": ForEach, "if": If}
 """Class of each block, which stands for several steps, by its name in a script."""
+
+KNOWN_STEPS: dict[str, type[Declared]] = {**STEPS, **BLOCKS}
+"""Class of everything that a list of steps may hold, by its name."""
+
+
+def examples() -> dict[str, str]:
+    """Return a valid example of each step that the page offers to insert, by the step's name."""
+    values = {name: step.example for name, step in KNOWN_STEPS.items() if step.example is not None}
+    return {name: f"{name}: {value}".removesuffix(": ") for name, value in values.items()}
 
 
 def _located(place: YamlValue, *steps: Step | Conditional) -> tuple[LocatedStep, ...]:
@@ -387,7 +398,11 @@ class Script(Declared):
 
 def parse(text: str) -> Script:
     """Return ``text`` as a script. Raises ScriptError with all problems, line by line."""
-    value = read(text)
+    return script_of(read(text))
+
+
+def script_of(value: YamlValue) -> Script:
+    """Return ``value`` as a script. Raises ScriptError with all problems, line by line."""
     names = Fields(value, Script.noun)
     context = context_of(names)
     try:

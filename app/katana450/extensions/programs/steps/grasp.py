@@ -75,7 +75,7 @@ class _Room:
 
 
 @dataclass(frozen=True)
-class Grasp(Step, word="grasp"):
+class Grasp(Step, word="grasp", example="cup"):
     """Open, approach an object, and close the fingers on it.
 
     Attributes:

@@ -78,7 +78,7 @@ class Joints(Step, word="joints"):
 
 
 @dataclass(frozen=True)
-class Nudge(Step, word="nudge"):
+class Nudge(Step, word="nudge", example="{axis: 1, by: 10}"):
     """Turn one joint by an angle.
 
     Attributes:
@@ -109,7 +109,7 @@ class TurnElbow(Step, word="turn_elbow"):
 
 
 @dataclass(frozen=True)
-class Home(Step, word="home"):
+class Home(Step, word="home", example=""):
     """Move to the ready posture."""
 
     noun = "`home`"
@@ -159,7 +159,7 @@ Climb = Annotated[float, LENGTH.about("Motion along the axis, mm")]
 
 
 @dataclass(frozen=True, eq=False)
-class Line(Step, word="line"):
+class Line(Step, word="line", example="{by: {z: 20}}"):
     """Move the tool point on a straight line, to a point or by an offset.
 
     Its orientation changes evenly.

@@ -45,7 +45,7 @@ CARRY_HEIGHTS = (0.1, 0.07, 0.05, 0.03, 0.015)
 
 
 @dataclass(frozen=True)
-class PlaceHeld(Step, word="place"):
+class PlaceHeld(Step, word="place", example="{at: {x: 300, y: 60}}"):
     """Put the held object down, and draw back.
 
     It stands upright then.
@@ -106,7 +106,7 @@ class PlaceHeld(Step, word="place"):
 
 
 @dataclass(frozen=True)
-class SetDown(Step, word="set_down"):
+class SetDown(Step, word="set_down", example=""):
     """Put the held object back to where it was grasped, and draw back."""
 
     noun = "`set_down`"
@@ -124,7 +124,7 @@ class SetDown(Step, word="set_down"):
 
 
 @dataclass(frozen=True)
-class Release(Step, word="release"):
+class Release(Step, word="release", example=""):
     """Open the fingers on the held object where it is, and draw back.
 
     The object stands on what is below it.
@@ -229,7 +229,7 @@ def _over(
 
 
 @dataclass(frozen=True)
-class Pick(Grasp, word="pick"):
+class Pick(Grasp, word="pick", example="cup"):
     """Grasp an object, and lift it."""
 
     def build(self, plan: PlanState) -> PlanState:

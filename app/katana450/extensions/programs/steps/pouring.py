@@ -385,7 +385,7 @@ POURING = "pour"
 
 
 @dataclass(frozen=True)
-class Pour(Step, word="pour"):
+class Pour(Step, word="pour", example="basin"):
     """Carry a held vessel over an object, turn it over, shake it, and turn it back.
 
     It stays upright until then. An arm of the five-axis family keeps the pitch of the grasp, and

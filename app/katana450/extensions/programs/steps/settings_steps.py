@@ -62,7 +62,7 @@ FINGERS = Kind(
 
 
 @dataclass(frozen=True)
-class Gripper(Step, word="gripper"):
+class Gripper(Step, word="gripper", example="open"):
     """Open or close the fingers, or move them to an angle, deg, or a place, mm, if they slide.
 
     Attributes:
@@ -106,7 +106,7 @@ class Gripper(Step, word="gripper"):
 
 
 @dataclass(frozen=True)
-class TimedPause(Step, word="wait"):
+class TimedPause(Step, word="wait", example="1"):
     """Wait, s."""
 
     short = "seconds"
@@ -119,7 +119,7 @@ class TimedPause(Step, word="wait"):
 
 
 @dataclass(frozen=True)
-class Tool(Step, word="tool"):
+class Tool(Step, word="tool", example="tcp"):
     """Tool frame of all later points: tcp, grasp or flange."""
 
     short = "name"
@@ -135,7 +135,7 @@ class Tool(Step, word="tool"):
 
 
 @dataclass(frozen=True)
-class Speed(Step, word="speed"):
+class Speed(Step, word="speed", example="0.5"):
     """Fraction of full speed of all later motions."""
 
     short = "value"
@@ -148,7 +148,7 @@ class Speed(Step, word="speed"):
 
 
 @dataclass(frozen=True)
-class Fill(Step, word="fill"):
+class Fill(Step, word="fill", example="100"):
     """Fill the cup with water, ml."""
 
     short = "water"
