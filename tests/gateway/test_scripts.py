@@ -53,11 +53,16 @@ def test_text_is_read_as_poses_or_with_its_problems(server: VirtualServer) -> No
     pose = {"joints": [0.0, -68.0, 85.0, 8.0, 0.0], "speed": 1.0, "blend": False}
     poses = [{**pose, "gripper": None, "wait": 1.0}]
     assert answer["taught"] == {"name": "Mine", "times": 1, "poses": poses}
-    assert read(server, "steps: [home]") == {"problems": [], "taught": None}
-    problems = read(server, "steps:\n  - hme\n  - wait: -1\n")["problems"]
+    assert [block["title"] for block in answer["blocks"]] == ["joints (0, -68, 85, 8, 0)", "wait 1"]
+    answer = read(server, "steps: [home]")
+    assert (answer["problems"], answer["taught"], len(answer["blocks"])) == ([], None, 1)
+    answer = read(server, "steps:\n  - hme\n  - wait: -1\n")
+    assert [block["line"] for block in answer["blocks"]] == [2, 3]
+    problems = answer["problems"]
     assert [problem["line"] for problem in problems] == [2, 3]
     assert "did you mean 'home'" in problems[0]["text"]
-    assert read(server, "")["problems"][0]["line"] == 1
+    answer = read(server, "steps: [")
+    assert (answer["problems"][0]["line"], answer["blocks"]) == (1, None)
 
 
 def test_script_is_saved_once_and_can_be_read(server: VirtualServer, folder: Path) -> None:
@@ -69,6 +74,7 @@ def test_script_is_saved_once_and_can_be_read(server: VirtualServer, folder: Pat
     listed = json.loads(body)
     assert (listed["saves"], listed["names"][0]) == (True, "Mine")
     assert "Pour" in listed["names"]
+    assert listed["steps"]["wait"] == "wait: 1"
     assert server.ask("/api/v1/scripts/Mine")[2].decode() == POSES
 
 

@@ -89,6 +89,7 @@ class YamlValue:
         number: the number that the text stands for; None if it stands for none.
         unit: kind of quantity of the number, see ``expression.Quantity``.
         why: why a text is not an expression with a value; empty if that was not tried.
+        last: last line of the text that it takes, from 1.
     """
 
     line: int
@@ -98,6 +99,7 @@ class YamlValue:
     number: float | None = None
     unit: str = PLAIN
     why: str = ""
+    last: int = 0
 
     @property
     def items(self) -> tuple[YamlValue, ...]:
@@ -165,16 +167,22 @@ def _place(mark: Any) -> tuple[int, int]:
 
 def _value(node: yaml.Node) -> YamlValue:
     line, column = _place(node.start_mark)
+    last = node.end_mark.line + 1
+    # The mark of a value without brackets is behind the comments that follow it.
     if isinstance(node, yaml.MappingNode):
         fields = tuple((_value(key), _value(value)) for key, value in node.value)
-        return YamlValue(line, column, fields, "mapping")
+        last = last if node.flow_style else fields[-1][1].last
+        return YamlValue(line, column, fields, "mapping", last=last)
     if isinstance(node, yaml.SequenceNode):
-        return YamlValue(line, column, tuple(map(_value, node.value)), "list")
+        items = tuple(map(_value, node.value))
+        last = last if node.flow_style else items[-1].last
+        return YamlValue(line, column, items, "list", last=last)
     if node.tag == NULL:
-        return YamlValue(line, column, None, "nothing")
+        return YamlValue(line, column, None, "nothing", last=last)
     kind = {TEXT: "text", WHOLE: "whole", REAL: "number"}.get(node.tag, "other")
     text = str(node.value)
-    return YamlValue(line, column, text, kind, _number(text))
+    last -= node.style in ("|", ">")
+    return YamlValue(line, column, text, kind, _number(text), last=last)
 
 
 def _number(text: str) -> float | None:

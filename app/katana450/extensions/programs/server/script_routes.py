@@ -15,8 +15,9 @@ from starlette.routing import BaseRoute, Route
 
 from katana450.arm.control.lease import CommandChannel
 from katana450.errors import InputError
-from katana450.extensions.programs.language.source import MAX_BYTES, ScriptError
-from katana450.extensions.programs.script.script import parse, script_schema
+from katana450.extensions.programs.language.source import MAX_BYTES, ScriptError, read
+from katana450.extensions.programs.script.blocks import blocks_of
+from katana450.extensions.programs.script.script import examples, parse, script_of, script_schema
 from katana450.extensions.programs.script.script_files import Scripts
 from katana450.extensions.programs.script.teach import taught
 from katana450.server.api.fields import ROOT
@@ -49,12 +50,12 @@ class ScriptRoutes:
         ]
 
     async def _list(self, request: Request) -> Response:
-        """Return the names of scripts for this arm, and whether there is a folder to save in."""
+        """Return the names of scripts for this arm, whether there is a folder, and examples."""
         self._context.identity(request)
         arm = self._context.hub.arm
         model = None if arm is None else arm.robot.arm
         names = await asyncio.to_thread(self._scripts.offered, model)
-        return _json({"names": names, "saves": self._scripts.keeps})
+        return _json({"names": names, "saves": self._scripts.keeps, "steps": examples()})
 
     async def _schema(self, _request: Request) -> Response:
         """Return the JSON Schema of scripts, which holds nothing of this server."""
@@ -69,16 +70,19 @@ class ScriptRoutes:
         return PlainTextResponse(text)
 
     async def _read(self, request: Request) -> Response:
-        """Return the problems of a text by line, and the taught poses if it has only these."""
+        """Return problems of a text by line, its blocks if it is YAML, and its poses if all are."""
 
-        def read(text: str) -> Response:
+        def reading(text: str) -> Response:
+            answer: dict[str, Any] = {"problems": (), "taught": None, "blocks": None}
             try:
-                poses = taught(parse(text))
+                value = read(text)
+                answer["blocks"] = blocks_of(value, text)
+                answer["taught"] = taught(script_of(value))
             except ScriptError as error:
-                return _json({"problems": error.problems, "taught": None})
-            return _json({"problems": (), "taught": poses})
+                answer["problems"] = error.problems
+            return _json(answer)
 
-        return await self._with_text(request, read)
+        return await self._with_text(request, reading)
 
     async def _save(self, request: Request) -> Response:
         """Save a text that is a valid script under a new name in the folder."""

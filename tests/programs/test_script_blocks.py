@@ -1,0 +1,109 @@
+"""The blocks of a script: the lines of its steps, for an editor that moves them."""
+
+from __future__ import annotations
+
+import pytest
+
+from katana450.extensions.programs.language.source import read
+from katana450.extensions.programs.run.simulation import plan_script
+from katana450.extensions.programs.script.blocks import Block, blocks_of
+from katana450.extensions.programs.script.script import KNOWN_STEPS, examples, parse
+from katana450.resources import URDF_PATH
+from tests.programs.test_script_schema import SCRIPTS
+
+TEXT = """\
+tool: tcp
+steps:
+  # a note on the list
+
+  # to the middle
+  - move: {x: 320, y: 0, z: 150, pitch: 50}   # level
+  - repeat:
+      times: 2
+      steps:
+        - line:
+            by: {z: 20}
+          # down again
+        - line: {by: {z: -20}}
+        # - wait: 1
+  - if:
+      held: cup
+      then: [home, {wait: 1}]
+      else:
+      - fill: 100
+expect: {}
+"""
+
+
+def blocks(text: str) -> tuple[Block, ...]:
+    return blocks_of(read(text), text)
+
+
+def test_blocks_have_their_lines_and_the_comments_above_them() -> None:
+    found = [(b.first, b.line, b.last, b.depth, b.indent, b.title) for b in blocks(TEXT)]
+    assert found == [
+        (1, 1, 1, 0, None, "tool tcp"),
+        (5, 6, 6, 0, 2, "move x 320, y 0, z 150, pitch 50"),
+        (7, 7, 14, 0, 2, "repeat times 2"),
+        (10, 10, 12, 1, 8, "line by z 20"),
+        (13, 13, 13, 1, 8, "line by z -20"),
+        (14, 14, 14, 1, 8, "wait 1"),
+        (15, 15, 19, 0, 2, "if held cup"),
+        (17, 17, 17, 1, None, "then: home"),
+        (17, 17, 17, 1, None, "then: wait 1"),
+        (19, 19, 19, 1, 6, "else: fill 100"),
+    ]
+    assert [b.enabled for b in blocks(TEXT)].count(False) == 1
+    assert len({b.group for b in blocks(TEXT)}) == 5
+
+
+def test_places_are_those_of_the_steps_that_are_planned() -> None:
+    places = {(block.line, block.column) for block in blocks(TEXT)}
+    assert {(step.line, step.column) for step in parse(TEXT).steps} <= places
+
+
+def test_step_of_several_lines_is_commented_out() -> None:
+    text = (
+        "steps:\n- home\n# - repeat:\n#     times: 2\n#\n#     steps: [home]   # here\n# words\n"
+        "#- home\n"
+    )
+    home, repeat = blocks(text)
+    assert (home.enabled, repeat.enabled) == (True, False)
+    assert (repeat.first, repeat.last, repeat.title) == (3, 6, "repeat times 2")
+
+
+def test_comments_that_are_no_steps_change_nothing() -> None:
+    text = "steps:\n  - home\n  # - homes\n  # - wait: [1\n  # a list: - home\n"
+    assert [block.title for block in blocks(text)] == ["home"]
+
+
+def test_mistakes_leave_the_blocks() -> None:
+    text = "steps:\n  - fly: 3\n  - {home: , wait: 1}\n  - line: {by: far}\n  - 3\n"
+    titles = [block.title for block in blocks(text)]
+    assert titles == ["fly 3", "home, wait 1", "line by far", "3"]
+
+
+@pytest.mark.parametrize("text", ["3", "[home]", "steps:", "steps: []", "steps: {home: 1}", "a: 1"])
+def test_text_without_steps_has_no_blocks(text: str) -> None:
+    assert blocks(text) == ()
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_blocks_of_every_script_of_the_project_cover_its_steps(name: str) -> None:
+    text = SCRIPTS[name]
+    places = {(block.line, block.column) for block in blocks(text)}
+    assert {(step.line, step.column) for step in parse(text).steps} <= places
+    for block in blocks(text):
+        first = text.split("\n")[block.line - 1]
+        assert block.indent is None or first[block.indent : block.indent + 2] == "- "
+
+
+def test_examples_are_valid_and_most_can_be_planned_alone() -> None:
+    texts = {name: f"  - {step}\n".replace("\n", "\n  ") for name, step in examples().items()}
+    assert set(texts) <= set(KNOWN_STEPS)
+    assert {"home", "gripper", "pick", "repeat", "if"} <= set(texts)
+    for text in texts.values():
+        parse(f"frame: base\nsteps:\n{text}")
+    alone = set(texts) - {"grasp", "place", "set_down", "release", "pick", "pour", "if", "fill"}
+    together = "".join(texts[name].rstrip() + "\n  - home\n" for name in sorted(alone))
+    plan_script(parse(f"frame: base\nsteps:\n{together}"), URDF_PATH)
