@@ -2,7 +2,7 @@
 import { button, html } from "../instruments/shape.js";
 
 /** @typedef {{ line: number, text: string }} Problem */
-/** @typedef {{ problems: Problem[], taught: import("./poses.js").Taught | null }} Reading */
+/** @typedef {{ problems: Problem[], taught: import("./poses.js").Taught | null, blocks: import("./blocks.js").Block[] | null }} Reading */
 const AFTER = 400; // ms without typing after which the text is checked
 const PLACE = /^line (\d+), column \d+: (.*)$/;
 
@@ -13,13 +13,21 @@ export class Editor {
     autocapitalize: "off", autocomplete: "off", wrap: "off", rows: "12", maxlength: "65536",
   });
   #numbers = html("pre", { "aria-hidden": "true" });
-  #problems = html("ol", { id: "teach-problems", role: "status" });
+  /** @type {Problem[]} */
+  problems = [];
+  list = html("ol", { id: "teach-problems", role: "status" }); // of the problems
+  /** @type {(Reading & { text: string }) | null} */
+  reading = null; // the last one, and the text that was read
   #timer = 0;
   #checked = 0;
 
-  /** `typed` is called with the text after each change. @param {(text: string) => void} typed */
-  constructor(typed) {
-    this.element.append(html("div", {}, this.#numbers, this.#area), this.#problems);
+  #jump;
+
+  // `typed` is called with the text after each change, `jump` with the line of a problem that is pressed.
+  /** @param {(text: string) => void} typed @param {(line: number) => void} jump */
+  constructor(typed, jump) {
+    this.#jump = jump;
+    this.element.append(html("div", {}, this.#numbers, this.#area));
     this.#area.addEventListener("input", () => {
       this.#count();
       typed(this.text);
@@ -44,30 +52,34 @@ export class Editor {
     this.#area.focus();
   }
 
-  /** Return what the server reads in the text, and show its problems. Without an answer return null. @returns {Promise<Reading | null>} */
-  async check() {
+  /** Return what the server reads in a text, and show its problems. Without an answer return null. @returns {Promise<Reading | null>} */
+  async check(text = this.text) {
     clearTimeout(this.#timer);
     const number = (this.#checked += 1);
-    const answer = await fetch("api/v1/scripts", { method: "POST", body: this.text }).catch(() => null);
+    const answer = await fetch("api/v1/scripts", { method: "POST", body: text }).catch(() => null);
     /** @type {Reading | null} */
     const reading = answer?.ok ? await answer.json() : null;
-    if (number === this.#checked && reading) this.explain(reading.problems);
+    if (number === this.#checked && reading) {
+      this.reading = { text, ...reading };
+      this.explain(reading.problems);
+    }
     return reading;
   }
 
   /** Show `problems`: {line, text} each. @param {Problem[]} problems */
   explain(problems) {
+    this.problems = problems;
     const lines = new Set(problems.map(({ line }) => line));
     [...this.#numbers.children].forEach((row, i) => row.classList.toggle("bad", lines.has(i + 1)));
-    this.#problems.replaceChildren(
+    this.list.replaceChildren(
       ...problems.map(({ line, text }) =>
-        html("li", {}, button([html("b", {}, `Line ${line}`), ` ${text}`], () => this.#select(line))),
+        html("li", {}, button([html("b", {}, `Line ${line}`), ` ${text}`], () => this.#jump(line))),
       ),
     );
   }
 
-  /** @param {number} line */
-  #select(line) {
+  /** Select a line. @param {number} line */
+  select(line) {
     const lines = this.text.split("\n");
     const start = lines.slice(0, line - 1).reduce((sum, row) => sum + row.length + 1, 0);
     this.#area.focus();

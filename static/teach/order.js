@@ -1,9 +1,11 @@
 // Drag a row of a list to another place by its handle, as the browser drags.
-/** @type {{ row: HTMLElement, drop: (row: HTMLElement, to: number) => void } | null} */
+/** @typedef {(row: HTMLElement, to: number, over: HTMLElement, after: boolean) => void} Drop */
+/** @type {{ row: HTMLElement, drop: Drop } | null} */
 let dragged = null;
 
-// `drop` is called with the row and the index among the other rows at which it was released.
-/** @param {HTMLElement} row @param {HTMLElement} handle @param {(row: HTMLElement, to: number) => void} drop */
+// `drop` is called with the row, the index among the other rows at which it was released, the row below the pointer, and
+// whether it is after that.
+/** @param {HTMLElement} row @param {HTMLElement} handle @param {Drop} drop */
 export function draggable(row, handle, drop) {
   handle.draggable = true;
   handle.addEventListener("dragstart", ({ dataTransfer }) => {
@@ -20,6 +22,6 @@ export function draggable(row, handle, drop) {
       row.classList.toggle("before", kind === "dragover" && !after);
       row.classList.toggle("after", kind === "dragover" && after);
       const others = [...(row.parentElement?.children ?? [])].filter((other) => other !== dragged?.row);
-      if (kind === "drop") dragged.drop(dragged.row, others.indexOf(row) + Number(after));
+      if (kind === "drop") dragged.drop(dragged.row, others.indexOf(row) + Number(after), row, after);
     });
 }

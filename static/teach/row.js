@@ -5,13 +5,13 @@ import { MAX_WAIT, restsBecause } from "./poses.js";
 
 /** @typedef {import("./poses.js").Pose} Pose */
 /** @typedef {"go" | "up" | "down" | "remove" | "grip" | "blend"} Name */
+/** @typedef {keyof typeof SHAPES} Shape */
 /**
  * @typedef {object} Acts
  * @property {(id: string, fields: Partial<Pose>) => void} put @property {(id: string) => void} go
  * @property {(id: string, by: number) => void} move @property {(id: string) => void} remove
  * @property {(id: string) => void} toggleGrip
  */
-/** @type {Record<Name, string>} */
 const SHAPES = {
   go: "M3 10h12M10 4.5 15.5 10 10 15.5",
   up: "M10 16V4M4.5 9.5 10 4l5.5 5.5",
@@ -19,10 +19,14 @@ const SHAPES = {
   remove: "M5 5l10 10M15 5 5 15",
   grip: "M7 17v-4L3.5 9.5V3M13 17v-4l3.5-3.5V3M7 13h6",
   blend: "M3 16c9 0 3-12 14-12",
+  copy: "M7 7h9v9H7zM4 13V4h9",
+  off: "M10 3v7M6 5.5a6 6 0 1 0 8 0",
+  add: "M10 4v12M4 10h12",
+  text: "M4 16l1-4 8-8 3 3-8 8zM11 6l3 3",
 };
 
-/** @param {Name} name @param {() => void} act @param {Node[]} words */
-const drawn = (name, act, ...words) =>
+/** Return a button with a picture. @param {Shape} name @param {() => void} act @param {Node[]} words */
+export const drawn = (name, act, ...words) =>
   button([svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d: SHAPES[name] })), ...words], act, { class: name });
 
 /**

@@ -20,6 +20,8 @@ export class Scripts {
   shown = new Option("", ""); // the program that the sheet shows
   #file = html("input", { type: "file", accept: ".yaml,.yml", "aria-label": "File of a script", hidden: "" });
   #keep = button("Save", () => this.#save(), { hidden: "", title: "Save in the folder of the server" });
+  /** @type {Record<string, string>} */
+  examples = {}; // of steps, by their names
   controls = [button("Download", () => this.#download()), this.#keep, this.#file];
 
   /** @param {Sheet} sheet */
@@ -33,9 +35,10 @@ export class Scripts {
   async list() {
     const answer = await request("api/v1/scripts").catch(() => null);
     if (!answer) return;
-    /** @type {{ names: string[], saves: boolean }} */
-    const { names, saves } = await answer.json();
+    /** @type {{ names: string[], saves: boolean, steps: Record<string, string> }} */
+    const { names, saves, steps } = await answer.json();
     this.#keep.hidden = !saves;
+    this.examples = steps;
     this.open.replaceChildren(this.shown, new Option("New poses", NEW), new Option("A file …", FILE), ...names.map((name) => new Option(name)));
     this.open.value = "";
   }

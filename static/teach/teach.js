@@ -12,6 +12,7 @@ import { Player } from "./player.js";
 import { MAX_POSES, MAX_TIMES, fingersOf, isPicture, poseOf, read, scriptOf } from "./poses.js";
 import { Row } from "./row.js";
 import { Scripts } from "./scripts.js";
+import { Steps } from "./steps.js";
 
 /** @typedef {import("./poses.js").Pose} Pose */
 const ID = "teach"; // id of the requests
@@ -21,7 +22,8 @@ const AROUND = [[0, 0, 0], [0, 0, 0.5], "/target/move"]; // places round the arm
 const RADIANS = Math.PI / 180;
 const EMPTY = "There is no pose yet. Move the arm and add a pose.";
 const TEACH = "Move the arm, then press Add pose. Each pose keeps the joints and the gripper. Or choose a program above.";
-const UNPLANNED = "Preview plans the program, shows its path in the scene and lists its steps here. Run also plans it first.";
+const NO_STEP = "There is no step yet. Insert the first one, or add poses.";
+const ERRORS = "The text has errors: see the lines below.";
 /** @typedef {"poses" | "steps" | "text"} View */
 const VIEWS = /** @type {const} */ ({ poses: "Poses", steps: "Steps", text: "Text" });
 
@@ -41,7 +43,7 @@ export class Teach {
     },
     report: (words, bad) => this.#report(words, bad),
   });
-  #editor = new Editor((text) => this.#content.keepText(text));
+  #editor = new Editor((text) => this.#content.keepText(text), (line) => this.#jump(line));
   /** @type {string | null} */
   #current = null; // id of the pose to which the arm moves
   #sheet = html("section", { id: "teach", class: "sheet", "aria-label": "Programs: record, preview and run", hidden: "" });
@@ -63,6 +65,7 @@ export class Teach {
   /** @type {View} */
   #view = "poses";
   #plan;
+  #steps;
   #other = html("p", { id: "teach-other", hidden: "" });
 
   /** Return the sheet once it is styled and the arm is known. @param {Page.Context} page */
@@ -79,25 +82,36 @@ export class Teach {
     this.#arm = arm;
     this.#content = new Content(page.kept, arm, () => this.#draw());
     this.#plan = new Plan(page.say, () => this.#shownText, () => this.#drawPlan());
+    /** @type {import("./steps.js").Sheet} */
+    const sheet = {
+      text: () => this.#shownText,
+      change: (text, words) => {
+        this.#content.change({ text });
+        this.#report(words);
+      },
+      begin: () => `name: ${JSON.stringify(this.#content.now.name)}\nsteps:\n`,
+      jump: (line) => this.#jump(line),
+      examples: () => this.#scripts.examples,
+      pose: async () => `joints: [${poseOf(await this.#state(), arm, "").joints.join(", ")}]`,
+      report: (words, bad) => this.#report(words, bad),
+    };
+    this.#steps = new Steps(sheet, this.#plan, this.#editor);
     const display = {
       report: (/** @type {string} */ words, bad = false) => this.#report(words, bad),
       mark: (/** @type {string | null} */ pose) => this.#mark(pose),
       script: () => this.#script(),
-      refuse: (/** @type {string} */ words) => {
-        if (this.#content.now.text !== null) this.#see("text");
-        this.#report(words, true);
-      },
+      refuse: (/** @type {string} */ words) => this.#report(words, true),
     };
     this.#player = new Player(page, this.#content, this.#editor, display, this.#plan, ID);
-    const preview = button("Preview", () => this.#player.start(null), { title: "Plan it, and show the path of the tool" });
+    const preview = button("Preview", () => this.#player.start(null), { title: "Plan it: show the path of the tool, and times and breakpoints of the steps" });
     const actions = html("div", { class: "bar" }, this.#play, this.#step, preview, this.#undo, this.#redo);
     const views = html("div", { class: "bar views", role: "group", "aria-label": "Show as" }, ...Object.values(this.#views), this.#add);
     const loop = html("label", {}, "Loop", this.#times, "times");
     const named = html("label", { class: "wide" }, "Name", this.#name);
     const files = html("div", { class: "bar" }, ...this.#scripts.controls);
     const rest = html("div", { class: "rest" }, html("div", { class: "bar" }, named, loop), files);
-    const scrolled = html("div", { class: "scrolled" }, this.#empty, this.#list, this.#plan.list, this.#editor.element);
-    this.#sheet.append(this.#scripts.open, actions, this.#says, this.#other, this.#plan.look, views, scrolled, rest);
+    const scrolled = html("div", { class: "scrolled" }, this.#empty, this.#list, this.#steps.element, this.#editor.element);
+    this.#sheet.append(this.#scripts.open, actions, this.#says, this.#other, this.#plan.look, views, scrolled, this.#editor.list, rest);
     element("dock", HTMLElement).prepend(this.#sheet);
     this.#times.addEventListener("change", () => {
       const times = Math.min(Math.max(Math.round(this.#times.valueAsNumber) || 1, 1), MAX_TIMES);
@@ -257,13 +271,21 @@ export class Teach {
     this.#editor.focus();
   }
 
+  // Show a line of the text; its block stays marked in the list of steps.
+  /** @param {number} line */
+  #jump(line) {
+    this.#steps.select(line);
+    this.#toText();
+    this.#editor.select(line);
+  }
+
   async #toPoses() {
     if (this.#content.now.text === null) return this.#see("poses");
     const reading = await this.#editor.check();
     if (!reading) return this.#report("There is no connection to the arm.", true);
     if (reading.taught) return this.#takeTaught(reading.taught);
     if (reading.problems.length) this.#see("text");
-    this.#report(reading.problems.length ? "The text has errors: see the lines below." : "It has steps that are no poses.", true);
+    this.#report(reading.problems.length ? ERRORS : "It has steps that are no poses.", true);
   }
 
   /** @param {import("./poses.js").Taught} taught */
@@ -300,11 +322,11 @@ export class Teach {
   async #load(text, name) {
     this.#editor.text = text;
     this.#view = "steps";
-    this.#content.change({ text, name: name.slice(0, 40) });
+    this.#content.change({ text: this.#editor.text, name: name.slice(0, 40) });
     const reading = await this.#editor.check();
     if (reading?.taught) return this.#takeTaught({ ...reading.taught, name: this.#content.now.name });
-    if (reading?.problems.length) this.#see("text");
-    this.#report(reading?.problems.length ? "The text has errors: see the lines below." : `${name} is opened.`);
+    this.#see(reading?.problems.length && !reading.blocks ? "text" : "steps");
+    this.#report(reading?.problems.length ? ERRORS : `${name} is opened.`);
   }
 
   // Display
@@ -318,8 +340,9 @@ export class Teach {
   // Show the steps of the program of the server, or that it has another one.
   #drawPlan() {
     const isSteps = this.#view === "steps";
-    this.#empty.hidden = isSteps ? this.#plan.list.childElementCount > 0 : this.#view === "text" || this.#poses.length > 0;
-    write(this.#empty, isSteps ? UNPLANNED : TEACH);
+    if (isSteps) this.#steps.draw();
+    this.#empty.hidden = isSteps ? this.#shownText !== null : this.#view === "text" || this.#poses.length > 0;
+    write(this.#empty, isSteps ? NO_STEP : TEACH);
     const { isShown, used, answer } = this.#plan;
     const isOther = used !== null && !isShown;
     if (isOther && this.#other.hidden) {
@@ -341,7 +364,8 @@ export class Teach {
     const isText = text !== null;
     this.#sheet.classList.toggle("text", isText);
     this.#list.hidden = this.#view !== "poses";
-    this.#plan.list.hidden = this.#view !== "steps";
+    this.#steps.element.hidden = this.#view !== "steps";
+    this.#editor.list.hidden = this.#view === "poses";
     this.#editor.element.hidden = this.#view !== "text";
     this.#add.hidden = this.#view !== "poses";
     // A pose may be several steps, and Go moves to one of them.

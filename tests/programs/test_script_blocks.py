@@ -6,7 +6,7 @@ import pytest
 
 from katana450.extensions.programs.language.source import read
 from katana450.extensions.programs.run.simulation import plan_script
-from katana450.extensions.programs.script.blocks import Block, blocks_of
+from katana450.extensions.programs.script.blocks import TextBlock, blocks_of
 from katana450.extensions.programs.script.script import KNOWN_STEPS, examples, parse
 from katana450.resources import URDF_PATH
 from tests.programs.test_script_schema import SCRIPTS
@@ -35,13 +35,13 @@ expect: {}
 """
 
 
-def blocks(text: str) -> tuple[Block, ...]:
+def blocks(text: str) -> tuple[TextBlock, ...]:
     return blocks_of(read(text), text)
 
 
 def test_blocks_have_their_lines_and_the_comments_above_them() -> None:
-    found = [(b.first, b.line, b.last, b.depth, b.indent, b.title) for b in blocks(TEXT)]
-    assert found == [
+    shown = [(b.first, b.line, b.last, b.depth, b.indent, b.title) for b in blocks(TEXT)]
+    assert shown == [
         (1, 1, 1, 0, None, "tool tcp"),
         (5, 6, 6, 0, 2, "move x 320, y 0, z 150, pitch 50"),
         (7, 7, 14, 0, 2, "repeat times 2"),

@@ -23,7 +23,7 @@ COMMENTED_STEP = re.compile(rf"( *)# - ({'|'.join(KNOWN_STEPS)})(:.*| *| +#.*)$"
 
 
 @dataclass(frozen=True)
-class Block:
+class TextBlock:
     """A step as lines of the text.
 
     Attributes:
@@ -47,7 +47,7 @@ class Block:
     enabled: bool = True
 
 
-def blocks_of(script: YamlValue, text: str) -> tuple[Block, ...]:
+def blocks_of(script: YamlValue, text: str) -> tuple[TextBlock, ...]:
     """Return the steps of ``script``, which was read from ``text``, and first its tool frame."""
     lines = text.split("\n")
     if len(f"{text}.".splitlines()) != len(lines):
@@ -57,13 +57,13 @@ def blocks_of(script: YamlValue, text: str) -> tuple[Block, ...]:
         script = read("\n".join(lines)) if disabled else script
     except ScriptError:
         lines, disabled = text.split("\n"), frozenset()
-    blocks: list[Block] = []
+    blocks: list[TextBlock] = []
     for name, value in script.fields if script.kind == "mapping" else ():
         if name.held == "steps":
             blocks += _listed(value, lines, disabled, 0, "")
         elif name.held == "tool":
             place = value.line, value.last, value.line, value.column
-            blocks.insert(0, Block(*place, None, 0, 0, f"tool {_words(value)}"))
+            blocks.insert(0, TextBlock(*place, None, 0, 0, f"tool {_words(value)}"))
     return tuple(blocks)
 
 
@@ -84,10 +84,10 @@ def _uncomment(lines: list[str]) -> frozenset[int]:
 
 def _listed(
     value: YamlValue, lines: Sequence[str], disabled: Collection[int], depth: int, before: str
-) -> Iterator[Block]:
+) -> Iterator[TextBlock]:
     """Yield the blocks of a list, each followed by those in it. ``before``: begins each title."""
     for item in value.items if value.kind == "list" else ():
-        inner: list[Block] = []
+        inner: list[TextBlock] = []
         for _, held in item.fields if item.kind == "mapping" else ():
             for name, steps in held.fields if held.kind == "mapping" else ():
                 if name.held in STEP_LISTS:
@@ -105,7 +105,7 @@ def _listed(
                     break
                 last += 1
         place, title = (first, last, item.line, item.column), before + _words(item)
-        yield Block(*place, indent, value.line, depth, title, enabled)
+        yield TextBlock(*place, indent, value.line, depth, title, enabled)
         yield from inner if enabled else ()
 
 

@@ -1,0 +1,257 @@
+// The steps of the script that is shown, as blocks that are edited in place; of the program that the server has also
+// their times, marks and breakpoints.
+import { write } from "../dom.js";
+import { button, html, set } from "../instruments/shape.js";
+import { duplicated, indexAt, inserted, isOnly, moved, placeBeside, placesOf, removed, toggled } from "./blocks.js";
+import { draggable } from "./order.js";
+import { drawn } from "./row.js";
+
+const CURRENT = ["shown", "now", "ended here"]; // marks
+const LOCKED = "This step shares its line with others. Edit it in the text.";
+const NEEDED = "Its list needs one step. Insert another one first, or change the step around it.";
+
+/** @typedef {import("./blocks.js").Block} Block */
+/** @typedef {import("./blocks.js").Edit} Edit */
+/** @typedef {"up" | "down" | "copy" | "off" | "add" | "text" | "remove"} Name */
+/** @typedef {{ element: HTMLElement, pause: HTMLButtonElement, run: HTMLButtonElement, number: HTMLElement, name: HTMLButtonElement, note: HTMLElement, steps: number[] }} Row */
+/**
+ * @typedef {object} Sheet
+ * @property {() => string | null} text returns that of the script that is shown; null without one
+ * @property {(text: string, words: string) => void} change takes an edited text
+ * @property {() => string} begin returns the text before the first step of a new script
+ * @property {(line: number) => void} jump shows a line of the text
+ * @property {() => Record<string, string>} examples returns a valid example of each step
+ * @property {() => Promise<string>} pose returns the step that moves to the present pose
+ * @property {(words: string, bad?: boolean) => void} report
+ */
+
+export class Steps {
+  #sheet;
+  #plan;
+  #editor;
+  /** @type {Row[]} */
+  #rows = [];
+  /** @type {Block[]} */
+  #blocks = []; // of the newest text that has some
+  /** @type {string | null} */
+  #asked = null; // the text that the server was asked to read
+  #line = 0; // a line of the block that is open
+  #edits = Promise.resolve(); // the last one
+  #list = html("ol", { class: "steps", "aria-label": "Steps" });
+  #menu = html("div", { class: "menu", role: "group", hidden: "" });
+  #buttons;
+  #acts;
+  element = html("div", {}, this.#list);
+
+  /** @param {Sheet} sheet @param {import("./plan.js").Plan} plan @param {import("./editor.js").Editor} editor */
+  constructor(sheet, plan, editor) {
+    this.#sheet = sheet;
+    this.#plan = plan;
+    this.#editor = editor;
+    /** @param {number} by */
+    const move = (by) => (/** @type {string} */ text, /** @type {Block} */ own, /** @type {number} */ i) => {
+      const { places, here } = placesOf(this.#blocks, i);
+      return places[here + by] && moved(text, own, places[here + by]);
+    };
+    /** @type {Record<Name, HTMLButtonElement>} */
+    this.#buttons = {
+      up: drawn("up", () => this.#edit("up", move(-1))),
+      down: drawn("down", () => this.#edit("down", move(1))),
+      copy: drawn("copy", () => this.#edit("copy", duplicated)),
+      off: drawn("off", () => this.#edit("off", toggled)),
+      add: drawn("add", () => {
+        this.#open(Boolean(this.#menu.hidden));
+        this.#menu.scrollIntoView({ block: "nearest" });
+      }),
+      text: drawn("text", () => this.#sheet.jump(this.#line)),
+      remove: drawn("remove", () => this.#edit("remove", removed)),
+    };
+    this.#acts = html("div", { class: "edit" }, html("div", { class: "acts" }, ...Object.values(this.#buttons)), this.#menu);
+  }
+
+  /** Open the block at a line, and mark it. @param {number} line */
+  select(line) {
+    this.#line = line;
+    this.#open(false);
+    this.draw();
+    this.#rows[indexAt(this.#blocks, line)]?.element.scrollIntoView({ block: "nearest" });
+  }
+
+  get #isCurrent() {
+    return this.#editor.reading?.text === this.#sheet.text();
+  }
+
+  /** Read the blocks of the script that is shown; return whether there are some. */
+  async #fresh() {
+    const text = this.#sheet.text();
+    if (text !== null && !this.#isCurrent) await this.#editor.check((this.#asked = text));
+    this.draw();
+    return this.#isCurrent && this.#editor.reading?.blocks !== null;
+  }
+
+  // Edit the block that is open. A second press may come before the server has read the text of the first.
+  /** @param {Name} name @param {(text: string, own: Block, i: number) => Edit | undefined} act */
+  #edit(name, act) {
+    this.#edits = this.#edits.then(() => this.#editOne(name, act));
+  }
+
+  /** @param {Name} name @param {(text: string, own: Block, i: number) => Edit | undefined} act */
+  async #editOne(name, act) {
+    if (!(await this.#fresh())) return;
+    const i = indexAt(this.#blocks, this.#line);
+    const text = this.#sheet.text();
+    const control = this.#buttons[name];
+    if (i < 0 || text === null || control.ariaDisabled === "true") return;
+    const edit = act(text, this.#blocks[i], i);
+    if (edit) this.#take(edit, `${control.ariaLabel}.`);
+  }
+
+  /** @param {Edit} edit @param {string} words */
+  #take({ text, line }, words) {
+    this.#line = line;
+    this.#open(false);
+    this.#sheet.change(text, words);
+  }
+
+  /** @param {string} step */
+  async #insert(step) {
+    const own = (await this.#fresh()) ? this.#blocks[indexAt(this.#blocks, this.#line)] : null;
+    const edit = inserted(this.#sheet.text() ?? this.#sheet.begin(), own ?? null, step);
+    this.#take(edit, `Insert: ${step.split("\n")[0]}.`);
+    this.#buttons.add.focus();
+  }
+
+  /** Open or close the menu of steps. @param {boolean} on */
+  #open(on) {
+    this.#menu.hidden = !on;
+    set(this.#buttons.add, "aria-expanded", on);
+    if (!on || this.#menu.childElementCount) return;
+    const pose = button("present pose", async () => this.#insert(await this.#sheet.pose()), { title: "joints: the angles of the present goal" });
+    const others = Object.entries(this.#sheet.examples()).map(([word, step]) => button(word.replaceAll("_", " "), () => this.#insert(step), { title: step }));
+    this.#menu.append(pose, ...others);
+  }
+
+  draw() {
+    const text = this.#sheet.text();
+    const { reading } = this.#editor;
+    if (text !== null && !this.#isCurrent && this.#asked !== text) this.#fresh();
+    if (text === null) this.#blocks = [];
+    else if (this.#isCurrent && reading?.blocks) this.#blocks = reading.blocks;
+    // Of a text that cannot be read the last blocks are shown.
+    const isLost = text !== null && this.#isCurrent && !reading?.blocks;
+    this.#list.inert = isLost;
+    this.#list.classList.toggle("lost", isLost);
+    set(this.#list, "aria-label", isLost ? "Steps before the mistake in the text" : "Steps");
+    /** @type {Map<string, number[]>} */
+    const numbers = new Map();
+    this.#plan.steps.forEach(({ line, column }, i) => {
+      const place = `${line}:${column}`;
+      numbers.set(place, [...(numbers.get(place) ?? []), i + 1]);
+    });
+    this.#list.classList.toggle("planned", numbers.size > 0);
+    const wrong = new Set(this.#editor.problems.map(({ line }) => indexAt(this.#blocks, line)));
+    while (this.#rows.length > this.#blocks.length) this.#rows.pop()?.element.remove();
+    while (this.#rows.length < this.#blocks.length) this.#list.append(this.#add(this.#rows.length).element);
+    this.#blocks.forEach((block, i) => this.#show(i, block, numbers.get(`${block.line}:${block.column}`) ?? [], wrong.has(i)));
+    this.#drawActs(text);
+  }
+
+  // Put the buttons into the row of the block that is open; the menu alone where there is no step yet.
+  /** @param {string | null} text */
+  #drawActs(text) {
+    const i = indexAt(this.#blocks, this.#line);
+    const focused = document.activeElement;
+    this.#rows.forEach(({ name }, other) => set(name, "aria-expanded", other === i));
+    const isFirst = text === null;
+    if (isFirst) this.#open(true);
+    const target = isFirst ? this.element : this.#rows[i]?.element;
+    set(this.#acts, "class", isFirst ? "edit first" : "edit");
+    if (!target) return this.#acts.remove();
+    if (this.#acts.parentElement !== target) {
+      const hadFocus = this.#acts.contains(focused);
+      target.append(this.#acts);
+      if (hadFocus && focused instanceof HTMLElement) focused.focus();
+    }
+    set(this.#menu, "aria-label", isFirst ? "Insert the first step" : `Insert after: ${this.#blocks[i].title}`);
+    if (!isFirst) this.#label(this.#blocks[i], i);
+  }
+
+  /** @param {Block} block @param {number} i */
+  #label({ title, enabled, indent }, i) {
+    const locked = indent === null && LOCKED;
+    const needed = locked || (isOnly(this.#blocks, i) && NEEDED);
+    const { places, here } = placesOf(this.#blocks, i);
+    /** @type {Record<Name, [string, string | boolean]>} */
+    const labels = {
+      up: ["Move up", needed || here <= 0],
+      down: ["Move down", needed || here === places.length - 1],
+      copy: ["Duplicate", locked],
+      off: [enabled ? "Disable" : "Enable", needed],
+      add: ["Insert after", locked],
+      text: ["Edit in the text", false],
+      remove: ["Remove", needed],
+    };
+    for (const [name, control] of /** @type {[Name, HTMLButtonElement][]} */ (Object.entries(this.#buttons))) {
+      const [words, off] = labels[name];
+      set(control, "aria-label", `${words}: ${title}`);
+      set(control, "title", typeof off === "string" ? off : `${words}: ${title}`);
+      set(control, "aria-disabled", Boolean(off));
+    }
+    set(this.#buttons.off, "aria-pressed", !enabled);
+  }
+
+  /** @param {number} i @returns {Row} */
+  #add(i) {
+    const pause = button("", () => this.#plan.toggle(this.#rows[i].steps), { class: "pause", title: "Pause before this step" });
+    const run = button("▶", () => this.#plan.runFrom(this.#rows[i].steps[0]), { title: "Run from this step" });
+    const [number, note] = [html("b", { title: "Drag to another place" }), html("span")];
+    const name = button("", () => this.select(name.ariaExpanded === "true" ? 0 : this.#blocks[i].line), { class: "name" });
+    const element = html("li", {}, pause, run, number, name, note);
+    draggable(element, number, (from, _, over, after) => this.#drop(this.#indexOf(from), this.#indexOf(over), after));
+    this.#rows.push({ element, pause, run, number, name, note, steps: [] });
+    return this.#rows[i];
+  }
+
+  /** @param {HTMLElement} row */
+  #indexOf(row) {
+    return this.#rows.findIndex(({ element }) => element === row);
+  }
+
+  /** @param {number} from @param {number} over @param {boolean} after */
+  #drop(from, over, after) {
+    const [own, text] = [this.#blocks[from], this.#sheet.text()];
+    if (text === null || !this.#isCurrent || own.indent === null) return;
+    if (isOnly(this.#blocks, from)) return this.#sheet.report(NEEDED, true);
+    const place = placeBeside(this.#blocks, from, over, after);
+    if (place) this.#take(moved(text, own, place), `Move: ${own.title}.`);
+  }
+
+  /** @param {number} i @param {Block} block @param {number[]} numbers its steps in the plan @param {boolean} isWrong */
+  #show(i, { title, depth, enabled, indent }, numbers, isWrong) {
+    const row = this.#rows[i];
+    const { element, pause, run, number, name, note } = row;
+    const planned = numbers.map((step) => this.#plan.steps[step - 1]);
+    const round = planned.findIndex(({ mark }) => CURRENT.includes(mark));
+    const isAlike = planned.every(({ mark }) => mark === planned[0].mark);
+    const mark = planned[round]?.mark ?? planned.find((step) => step.mark === "next")?.mark ?? (isAlike ? planned[0]?.mark : "");
+    const seconds = planned.reduce((sum, step) => sum + (step.mark === "skipped" ? 0 : step.seconds), 0);
+    row.steps = numbers;
+    if (round >= 0 && !element.ariaCurrent) element.scrollIntoView({ block: "nearest" });
+    if (round >= 0) set(element, "aria-current", "step");
+    else element.removeAttribute("aria-current");
+    set(element, "class", [mark, enabled ? "" : "off", isWrong ? "wrong" : ""].filter(Boolean).join(" "));
+    set(element, "aria-level", depth + 1);
+    element.style.setProperty("--depth", String(Math.min(depth, 6)));
+    const isOne = numbers.length === 1;
+    set(pause, "aria-label", isOne ? `Pause before step ${numbers[0]}` : `Pause each time before: ${title}`);
+    set(pause, "aria-pressed", numbers.length > 0 && numbers.every((step) => this.#plan.breakpoints.includes(step)));
+    set(run, "aria-label", isOne ? `Run from step ${numbers[0]}` : `Run from: ${title}`);
+    pause.hidden = run.hidden = !numbers.length;
+    number.draggable = indent !== null;
+    write(number, numbers.length ? String(numbers[0]) : "");
+    write(name, title);
+    const times = round >= 0 && !isOne ? `${round + 1} of ${numbers.length}` : "";
+    const words = [isWrong ? "mistake" : "", enabled ? "" : "disabled", mark ?? "", times, seconds ? `${seconds.toFixed(1)} s` : ""];
+    write(note, words.filter(Boolean).join(" "));
+  }
+}
