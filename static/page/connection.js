@@ -1,5 +1,5 @@
 // The quality of the connection: in the bar, and in a banner over the scene if it is lost or slow.
-import { element, first, sceneOf, write } from "../dom.js";
+import { element, first, write } from "../dom.js";
 
 const STALE = 1.0; // s, age from which a picture is marked as old
 const SLOW = 150; // ms, round trip from which a connection counts as slow
@@ -8,7 +8,7 @@ const ROUND_TRIP = "Round trip to the arm, and the age of the picture";
 export const OFFLINE = "No connection to the arm.";
 
 /** @param {Page.Context} page @param {boolean} unanswered whether a press of STOP has no answer */
-export function drawLink({ store, scene }, unanswered) {
+export function drawLink({ store }, unanswered) {
   const { status, up, silent, since } = store;
   const trip = store.trip ?? 0;
   const age = up ? Math.max(status?.age ?? 0, silent / 1000 - 0.2) : (performance.now() - since) / 1000;
@@ -24,9 +24,6 @@ export function drawLink({ store, scene }, unanswered) {
   banner.hidden = !(!up || bad || missing) || !status;
   banner.className = up ? "" : "lost";
   if (banner.hidden) return;
-  // Beside the panel, whose head says which arm it is.
-  const canvas = sceneOf(scene)?.viewer()?.canvas;
-  banner.style.width = `${canvas?.clientWidth ?? scene.clientWidth}px`;
   const stale = "The picture is old.";
   let words = "The picture is old, although the connection is fast: this device may draw too slowly.";
   if (up && !bad) words = missing;

@@ -151,7 +151,7 @@ export class Branches {
     if (!pixel || !option) return;
     const [x, y] = pixel;
     write(this.#label, option.words);
-    this.#label.style.left = `${this.#scene.offsetLeft + x}px`;
-    this.#label.style.top = `${this.#scene.offsetTop + y}px`;
+    this.#label.style.left = `${x}px`;
+    this.#label.style.top = `${y}px`;
   }
 }

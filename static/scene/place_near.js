@@ -10,13 +10,12 @@ const [RIGHT, BELOW] = [18, 14]; // px from the mouse to a label
  * @param {HTMLElement} bar @param {HTMLIFrameElement} scene @param {Page.Pixel} pixel
  */
 export function placeNear(bar, scene, [x, y]) {
-  const { offsetLeft, offsetTop } = scene;
   const { left, top, width } = sceneIn(scene).drawing().canvas.getBoundingClientRect();
   const { offsetWidth, offsetHeight } = bar;
   const start = Math.max(left + EDGE, Math.min(x - offsetWidth / 2, left + width - offsetWidth - EDGE));
   const above = y - ABOVE - offsetHeight;
-  bar.style.left = `${offsetLeft + start}px`;
-  bar.style.top = `${offsetTop + (above < top + EDGE ? y + ABOVE : above)}px`;
+  bar.style.left = `${start}px`;
+  bar.style.top = `${above < top + EDGE ? y + ABOVE : above}px`;
 }
 
 /**
@@ -25,10 +24,9 @@ export function placeNear(bar, scene, [x, y]) {
  */
 export function placeBeside(label, scene, [x, y], touch) {
   if (touch) return placeNear(label, scene, [x, y]);
-  const { offsetLeft, offsetTop } = scene;
   const { right, bottom } = sceneIn(scene).drawing().canvas.getBoundingClientRect();
   const { offsetWidth, offsetHeight } = label;
   const start = x + RIGHT + offsetWidth > right ? x - BELOW - offsetWidth : x + RIGHT;
-  label.style.left = `${offsetLeft + start}px`;
-  label.style.top = `${offsetTop + Math.min(y + BELOW, bottom - offsetHeight)}px`;
+  label.style.left = `${start}px`;
+  label.style.top = `${Math.min(y + BELOW, bottom - offsetHeight)}px`;
 }

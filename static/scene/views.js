@@ -1,6 +1,6 @@
 // The view cube: it turns as the scene does, and its faces turn the camera. Below it are the views that are
 // no face, and Fit. For fingers, to which some faces are too narrow, a list replaces it.
-import { sceneIn, sceneOf } from "../dom.js";
+import { element, sceneIn, sceneOf } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { NARROW, PANEL } from "../viser/names.js";
 
@@ -50,7 +50,11 @@ export class Views {
   /** @type {Element | null} */
   #sheet = null;
   #until = 0; // ms, when the camera counts as still again
-  #sized = new ResizeObserver(() => this.turned());
+  #sized = new ResizeObserver(() => {
+    // The width of viser's panel beside the picture.
+    element("desk", HTMLElement).style.setProperty("--panel", `${this.#scene.clientWidth - (this.#canvas?.clientWidth ?? 0)}px`);
+    this.turned();
+  });
 
   /** @param {HTMLElement} stage @param {HTMLIFrameElement} scene */
   constructor(stage, scene) {
@@ -140,8 +144,7 @@ export class Views {
     if (shown !== this.#shown) this.#cube.style.transform = this.#shown = shown;
     const { left, bottom: end } = canvas.getBoundingClientRect();
     const bottom = Math.min(end, sheet ? sheet.getBoundingClientRect().top : end);
-    const { offsetLeft, offsetTop } = this.#scene;
-    const placed = `${offsetLeft + left + EDGE}px ${offsetTop + bottom - EDGE}px`;
+    const placed = `${left + EDGE}px ${bottom - EDGE}px`;
     if (placed === this.#placed) return;
     this.#placed = placed;
     this.#group.style.translate = placed;

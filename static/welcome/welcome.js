@@ -99,8 +99,8 @@ export class Welcome {
     const pixel = sceneOf(scene)?.pixelOf(HANDLE);
     this.#pulse.hidden = !pixel;
     if (!pixel) return;
-    this.#pulse.style.left = `${scene.offsetLeft + pixel[0]}px`;
-    this.#pulse.style.top = `${scene.offsetTop + pixel[1]}px`;
+    this.#pulse.style.left = `${pixel[0]}px`;
+    this.#pulse.style.top = `${pixel[1]}px`;
   }
 
   #still() {

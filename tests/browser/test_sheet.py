@@ -27,7 +27,7 @@ PRESSABLE_SIZE = 40.0
 """Minimum width and height of a button of the page [px]."""
 
 PRESSABLE = """() => Object.fromEntries(
-    [...document.querySelectorAll("header button, #stage button")]
+    [...document.querySelectorAll("header button, #desk button")]
         .map((each) => [each.id || each.textContent, each.getBoundingClientRect()])
         .filter(([, { width }]) => width)
         .map(([name, { x, y, width, height }]) => [name, [x, y, width, height]]))"""
