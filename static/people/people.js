@@ -1,6 +1,6 @@
 // Who is connected, for admins: a list with buttons that disconnect.
 import { element, first, styled } from "../dom.js";
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 
 const EVERY = 1000; // ms between two queries while the list is open
 const CONTENT = `
@@ -59,17 +59,6 @@ export class People {
     this.say({ do: "list_people" });
   }
 
-  // `key` stays the same while the label changes, so that the focus finds the button again.
-  /** @param {string} key @param {string} label @param {string} name @param {(button: HTMLButtonElement) => void} act */
-  button(key, label, name, act) {
-    const made = html("button", { type: "button", "aria-label": `${label} ${name}`, "data-key": key }, label);
-    made.addEventListener("click", () => {
-      act(made);
-      this.look();
-    });
-    return made;
-  }
-
   // The second click revokes a link, because nothing brings it back.
   /** @param {Api.ConnectedPerson} person @param {HTMLButtonElement} button */
   kick({ person, name }, button) {
@@ -86,11 +75,15 @@ export class People {
   /** @param {Api.ConnectedPerson} member */
   row(member) {
     const { person, name, you, kept_out: out } = member;
-    const acts = html("div");
-    /** @param {string} key @param {string} label @param {(button: HTMLButtonElement) => void} act */
-    const add = (key, label, act) => acts.append(this.button(`${key} ${person}`, label, name, act));
-    if (out !== null) add("kick", "Let in", () => this.say({ do: "kick", person, seconds: 0 }));
-    else if (!you) add("kick", "Disconnect", (button) => this.kick(member, button));
+    const label = out === null ? "Disconnect" : "Let in";
+    const act = () => {
+      if (out === null) this.kick(member, made);
+      else this.say({ do: "kick", person, seconds: 0 });
+      this.look();
+    };
+    // Its person stays the same while the label changes, so that the focus finds the button again.
+    const made = button(label, act, { "aria-label": `${label} ${name}`, "data-person": person });
+    const acts = html("div", {}, ...(you && out === null ? [] : [made]));
     return html("li", {}, html("b", {}, you ? `${name} (you)` : name), acts, html("span", {}, about(member)));
   }
 
@@ -108,13 +101,13 @@ export class People {
     this.drawn = key;
     /** @type {HTMLElement | null | undefined} */
     const focused = document.activeElement?.closest("#people-list button");
-    const kept = focused?.dataset.key;
+    const kept = focused?.dataset.person;
     this.list.replaceChildren(...people.map((member) => this.row(member)));
     element("people-for", HTMLElement).hidden = people.length < 2;
     this.select.options[3].hidden = people.every(({ link }) => link === null);
     element("people-note", HTMLElement).hidden = people.every(({ role }) => role === "admin");
     // The focus stays on its button, although the list is drawn again.
     const buttons = [...this.list.querySelectorAll("button")];
-    if (kept) (buttons.find((button) => button.dataset.key === kept) ?? this.dialog.querySelector("button"))?.focus();
+    if (kept) (buttons.find((button) => button.dataset.person === kept) ?? this.dialog.querySelector("button"))?.focus();
   }
 }
