@@ -69,14 +69,14 @@ export class Episodes {
     const task = html("label", { class: "task" }, "Task", this.#task);
     this.sheet = html("section", { id: "episodes", class: "sheet", "aria-label": "Episodes", hidden: "" }, task, this.#rec, this.#says, this.#acts, this.#list, this.#about);
     element("dock", HTMLElement).append(this.sheet);
-    new MutationObserver(() => this.#show()).observe(this.sheet, { attributeFilter: ["hidden"] });
+    new MutationObserver(() => this.#fill()).observe(this.sheet, { attributeFilter: ["hidden"] });
+    // Not when it is open again after a reload: Space, which stops, would type a blank.
+    opener.addEventListener("click", () => this.#focus());
   }
 
-  #show() {
-    if (this.sheet.hidden) return;
-    this.#fill();
+  #focus() {
     // On a touch screen this would open its keyboard.
-    if (this.#may && matchMedia("(hover: hover)").matches) (this.#task.value ? this.#rec : this.#task).focus();
+    if (!this.sheet.hidden && this.#may && matchMedia("(hover: hover)").matches) (this.#task.value ? this.#rec : this.#task).focus();
   }
 
   /** Show the state in a status. @param {Page.Status} status */

@@ -208,3 +208,17 @@ def test_windows_agree_and_a_reload_keeps_rec(
     first.page.click("#episodes-button")
     first.wait_until(lambda: first.page.locator("#episodes .gone").count() == 1, "the discarded")
     assert first.errors == second.errors == []
+
+
+def test_episodes_are_open_again_without_taking_the_keys(
+    recording_server: AppServer, open_page: OpenPage
+) -> None:
+    window = open_page(recording_server.url, window=WIDE, drawing=Drawing.NONE)
+    ready(window)
+    page = window.page
+    page.click("#episodes-button")
+    page.locator("#episodes").wait_for()
+    page.reload()
+    page.locator("#episodes").wait_for()
+    # In a field, Space would type a blank and not stop the arm.
+    assert page.evaluate("() => document.activeElement === document.body")
