@@ -33,7 +33,6 @@ from katana450.extensions.programs.run.simulation import (
     ready,
     run_by_clock,
 )
-from katana450.extensions.programs.script.measures import MeasuredRun
 from katana450.extensions.programs.script.script import Script, parse
 from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.extensions.programs.script.script_scene import begun
@@ -103,10 +102,9 @@ def simulate(script: Script, options: Namespace) -> int:
         "speed": program.speed,
         "ticks_per_s": Settings().rate,
         "seed": options.seed,
+        **({} if plant is None else {"measured": f"a simulated plant, {options.plant}"}),
     }
     report = Report.of(script, simulation, facts, notes)
-    measured = MeasuredRun.of(simulation.arm, simulation.states)
-    report = report.with_measured(measured, f"a simulated plant, {options.plant}")
     print(f"{script.name}: {len(simulation.t)} ticks, {simulation.t[-1]:.2f} s.")
     print("\n".join(f"  {line}" for line in report.lines))
     if options.report is not None:

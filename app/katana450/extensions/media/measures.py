@@ -35,6 +35,9 @@ from katana450.maths.water.units import MILLILITRE
 PATH_SAMPLES = 2000
 """Number of intervals of each path at whose ends the kinematics are compared."""
 
+SMALLEST = float(np.finfo(float).tiny)
+"""Smallest divisor."""
+
 
 @dataclass(frozen=True, eq=False)
 class PathTrace:
@@ -150,10 +153,12 @@ def errors_between_ticks(run: Simulation) -> FloatArray:
         path, sigma, next_sigma = path_of(before), path_fraction(before), path_fraction(after)
         if path is None or path is not path_of(after) or sigma == next_sigma:
             continue
-        q = 0.5 * (before.setpoint + after.setpoint)
-        p, tangent = _curve(path, 0.5 * (sigma + next_sigma))
-        off = _point(path, q) - p
-        errors.append(float(np.linalg.norm(off - (off @ tangent) * tangent)))
+        point = path.point(Jet.variable(0.5 * (sigma + next_sigma)))
+        p, rate = np.array([coordinate.derivatives()[:2] for coordinate in point], dtype=float).T
+        off = _point(path, 0.5 * (before.setpoint + after.setpoint)) - p
+        # No motion gives a zero rate.
+        along = (off @ rate) / max(float(rate @ rate), SMALLEST) * rate
+        errors.append(float(np.linalg.norm(off - along)))
     return np.array(errors)
 
 
@@ -176,17 +181,6 @@ def _traced(name: str, path: CurvePath) -> PathTrace:
 def _point(path: CurvePath, q: FloatArray) -> FloatArray:
     p: FloatArray = forward(path.chain, q)[:3, 3]
     return p
-
-
-def _curve(path: CurvePath, sigma: float) -> tuple[FloatArray, FloatArray]:
-    """Return point (3,) [m] and unit tangent (3,) at ``sigma``; no motion gives a zero tangent."""
-    point = path.point(Jet.variable(sigma))
-    p, rate = (
-        np.array([coordinate.derivatives()[order] for coordinate in point], dtype=float)
-        for order in (0, 1)
-    )
-    length = float(np.linalg.norm(rate))
-    return p, rate / length if length > 0.0 else rate
 
 
 def _fraction(run: Simulation, maximum: FloatArray, order: int) -> float:

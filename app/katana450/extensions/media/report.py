@@ -9,7 +9,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -72,28 +72,16 @@ class Report:
         facts: dict[str, Any],
         notes: tuple[str, ...] = (),
     ) -> Report:
-        """Return the report with all measures."""
-        values = measurements(run)
-        return Report(script, run, values, bounds(script, values), facts, notes)
+        """Return the report with all measures, also those of a measured arm."""
+        values, measured = measurements(run), MeasuredRun.of(run.arm, run.states)
+        if measured is not None:
+            values |= measured.values
+        return Report(script, run, values, bounds(script, values), facts, notes, measured)
 
     @property
     def missed(self) -> list[Bound]:
         """The bounds that are not met."""
         return [bound for bound in self.bounds if not bound.held]
-
-    def with_measured(self, measured: MeasuredRun | None, what: str) -> Report:
-        """Return the report with the run as it was ``measured``; ``what``: the arm."""
-        if measured is None:
-            return self
-        values = self.values | measured.values
-        facts = self.facts | {"measured": what}
-        checked = bounds(self.script, values)
-        return replace(self, values=values, bounds=checked, facts=facts, measured=measured)
-
-    @property
-    def held(self) -> bool:
-        """True if every bound is met."""
-        return not self.missed
 
     @property
     def lines(self) -> list[str]:
@@ -131,7 +119,7 @@ class Report:
         ]
         entries = {
             **self.values,
-            "bounds_held": self.held,
+            "bounds_held": not self.missed,
             "bounds": expected,
             "script": self.script.name,
             **self.facts,
@@ -235,10 +223,9 @@ class Report:
             f"{_with_unit(bound.name, bound.value)}; {bound.wanted}</li>"
             for bound in self.bounds
         )
-        verdict = {
-            True: "Every bound is met." if self.bounds else "The script expects no bounds.",
-            False: "A bound is not met.",
-        }[self.held]
+        verdict = "Every bound is met." if self.bounds else "The script expects no bounds."
+        if self.missed:
+            verdict = "A bound is not met."
         notes = "".join(f"<p>{html.escape(note)}</p>" for note in self.notes)
         facts = " · ".join(
             f"{name.replace('_', ' ')} {value:g}" if isinstance(value, float) else f"{name} {value}"
@@ -248,7 +235,7 @@ class Report:
             name=html.escape(self.script.name),
             about=f"<p>{html.escape(self.script.about)}</p>" if self.script.about else "",
             verdict=verdict,
-            result="held" if self.held else "missed",
+            result="missed" if self.missed else "held",
             figures=shown,
             tables=tables,
             checks=checks,
