@@ -11,7 +11,6 @@ const DEGREES = 180 / Math.PI;
 /** @type {[string, Api.Attachment, string][]} */
 const MOUNTS = [
   ["Hand", "hand", "It moves with the hand as a part of it"],
-  ["Table", "table", "It is set down on the table below"],
   ["Here", "world", "It stays where it is, even in the air"],
 ];
 

@@ -234,10 +234,3 @@ def test_commands_about_a_hand_or_water_are_refused(make: Make) -> None:
         session.check(cmd.Batch((cmd.ReplaceScene((block(),), 1e-5),)))
     with pytest.raises(InputError, match="Only its joints can be driven"):
         session.check(cmd.Tool("tcp"))
-
-
-def test_an_object_is_put_down_on_the_table_below_the_base(make: Make) -> None:
-    session = make(column(-0.3)).session
-    state = during(session, begun(session), 0.05, cmd.PlaceObject(block(0.2)))[-1]
-    (down,) = during(session, state, 0.05, cmd.Attach("block", Attachment.TABLE))[-1].objects
-    np.testing.assert_allclose(down.T[:3, 3], (0.2, 0.0, -0.3), atol=1e-6)

@@ -75,7 +75,7 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
         ),
         cmd.PlaceObject: lambda: cmd.PlaceObject(cup),
         cmd.Remove: lambda: cmd.Remove("cup"),
-        cmd.Attach: lambda: cmd.Attach("cup", Attachment.TABLE),
+        cmd.Attach: lambda: cmd.Attach("cup", Attachment.WORLD),
         cmd.ReplaceScene: lambda: cmd.ReplaceScene(objects),
         cmd.MoveObject: lambda: cmd.MoveObject("cup", np.array([0.3, 0.35, 0.0])),
         cmd.SetAppearance: lambda: cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1),

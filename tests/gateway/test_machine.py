@@ -159,7 +159,7 @@ def test_object_is_attached_undone_and_saved_with_the_scene(
     column_server: VirtualServer, column_arm: Client
 ) -> None:
     place(column_arm, position=(0.2, -0.2))
-    column_arm.ask(requests.Attach(name="block", to=requests.Attachment.TABLE))
+    column_arm.ask(requests.Attach(name="block", to=requests.Attachment.WORLD))
     with pytest.raises(RefusedError, match="Nothing can be fixed to a hand: there is no arm"):
         column_arm.ask(requests.Attach(name="block", to=requests.Attachment.HAND))
     with pytest.raises(RefusedError, match="no cup"):

@@ -17,7 +17,7 @@ declare namespace Api {
   interface Ask { do: "ask"; id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface Attach { do: "attach"; name: string; to: Attachment; T?: number[][] | null; id?: number | string | null;
     revocations?: number | null; made?: number | null; }
-  type Attachment = "hand" | "table" | "world";
+  type Attachment = "hand" | "world";
   interface Branch { do: "branch"; name: string; id?: number | string | null; revocations?: number | null;
     made?: number | null; wait?: number | null; }
   interface BranchOption { name: string; shoulder: string | null; elbow: string | null; q: number[];

@@ -22,7 +22,7 @@ from katana450.arm.control.commands.act import classes_of
 from katana450.arm.control.lease import SERVER, Actor, CommandChannel, Grounds, Person, Role
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.modes import Target, Tracking
-from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Shape
 from katana450.arm.control.state.solid import Solid
 from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.arm.control.state.stop_cause import pressed
@@ -368,6 +368,7 @@ SAMPLE = {"is": "Servo", "q": [0.1, 0.2], "qd": None, "gripper": None}
             cmd.Branch(name="back-up"),
         ),
         ({"is": "SpeedScale", "value": 0.5}, cmd.Speed(0.5)),
+        ({"is": "attach", "name": "cup", "to": "TABLE"}, cmd.Attach("cup", Attachment.WORLD)),
         ({"is": "offer_detour", "plan": "0123"}, cmd.Batch(())),
         ({"is": "Fill", "volume": ML * 100.0}, cmd.Fill(100.0)),
         ({"is": "Hold", "finding": None}, cmd.Hold()),

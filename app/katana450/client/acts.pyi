@@ -144,8 +144,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
 
         Args:
             name: Name of the object.
-            to: Body to which the object is fixed. With `"table"` it is put down upright on the table
-                below.
+            to: Body to which the object is fixed.
             T: (4, 4) Pose on the hand, in the frame of the arm's default tool. Without it the object
                 stays where it is.
         """

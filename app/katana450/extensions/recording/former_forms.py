@@ -11,8 +11,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from katana450.arm.control.commands.act import tag_of
+from katana450.arm.control.commands.object_commands import Attach
 from katana450.arm.control.objects.pouring import CUP
 from katana450.arm.control.state.modes import Following, Positioning, Target
+from katana450.arm.control.state.scene_objects import Attachment
 from katana450.extensions.recording.forms import FormError, shown
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.flow import MotionWithWater
@@ -103,6 +105,8 @@ def upgraded(kind: type, form: Mapping[str, Any], detours: list[Any]) -> Mapping
     """
     if kind is ToolTarget and "R" in form:
         return {"position": form.get("position"), "rotation": form["R"]}
+    if kind is Attach and form.get("to") == "TABLE":
+        return dict(form) | {"to": Attachment.WORLD.name}
     if kind is Following:
         return {name: content for name, content in form.items() if name != "towards"}
     if kind is Positioning:

@@ -12,7 +12,7 @@ from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Z
 from katana450.caching import cached_property
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
-from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.environment import TableTop
 
@@ -152,21 +152,7 @@ class Environment:
             return scene_object
         if to is Attachment.HAND:
             return replace(scene_object, T=self.into_hand(scene_object.T, x), fixed=True)
-        if to is Attachment.TABLE:
-            return self.left(scene_object, x, self.table_height)
         return replace(scene_object, T=self.pose(scene_object, x), fixed=False)
-
-    def left(self, scene_object: SceneObject, x: FloatArray, height: float = 0.0) -> SceneObject:
-        """Return ``scene_object`` released from the hand, upright on what carries it.
-
-        x: (k,) joints and finger joint [rad].
-        height: of the surface below it [m].
-        """
-        T = self.pose(scene_object, x)
-        yaw = float(np.arctan2(T[1, 0] - T[0, 1], T[0, 0] + T[1, 1]))
-        place = (T[0, 3], T[1, 3], height)
-        T = se3.from_rotation_translation(so3.rotation_z(yaw), place)
-        return replace(scene_object, T=T, held=False, fixed=False)
 
     def tool_point(self, x: FloatArray) -> FloatArray:
         """Return the point (3,) in the base frame where the fingers close [m].

@@ -104,7 +104,7 @@ def check_mounted(
     x: (k,) joints and finger joint [rad].
     """
     left = environment.mounted(scene_object, to, x)
-    if to is Attachment.TABLE or is_loose(left):
+    if is_loose(left):
         check_carried(environment.table, objects, left, may_fall=True)
 
 

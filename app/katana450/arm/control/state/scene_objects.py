@@ -71,8 +71,6 @@ class Attachment(Enum):
     """The object moves with the hand, whatever the fingers do, and counts as a part of it."""
     WORLD = "world"
     """The object stays where it is."""
-    TABLE = "table"
-    """The object is put down upright on the table below, and stays there."""
 
 
 class Zone(Enum):
