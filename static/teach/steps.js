@@ -84,7 +84,10 @@ export class Steps {
   /** Read the blocks of the script that is shown; return whether there are some. */
   async #fresh() {
     const text = this.#sheet.text();
-    if (text !== null && !this.#isCurrent) await this.#editor.check((this.#asked = text));
+    if (text !== null && !this.#isCurrent) {
+      const reading = await this.#editor.check((this.#asked = text));
+      if (!reading) this.#sheet.report("The server does not answer.", true);
+    }
     this.draw();
     return this.#isCurrent && this.#editor.reading?.blocks !== null;
   }
@@ -125,9 +128,10 @@ export class Steps {
   #open(on) {
     this.#menu.hidden = !on;
     set(this.#buttons.add, "aria-expanded", on);
-    if (!on || this.#menu.childElementCount) return;
+    const examples = Object.entries(this.#sheet.examples());
+    if (!on || this.#menu.childElementCount || !examples.length) return;
     const pose = button("present pose", async () => this.#insert(await this.#sheet.pose()), { title: "joints: the angles of the present goal" });
-    const others = Object.entries(this.#sheet.examples()).map(([word, step]) => button(word.replaceAll("_", " "), () => this.#insert(step), { title: step }));
+    const others = examples.map(([word, step]) => button(word.replaceAll("_", " "), () => this.#insert(step), { title: step }));
     this.#menu.append(pose, ...others);
   }
 
