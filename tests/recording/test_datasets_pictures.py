@@ -104,7 +104,7 @@ def test_pictures_show_the_states(tmp_path: Path) -> None:
             for state in RecordedStates(file, session).at(times):
                 for view, pictures in expected.items():
                     shot = Shot(Preset[view], SIZE)
-                    pictures.append(shot.taken(stage, robot, state).pixels)
+                    pictures.append(shot.taken(stage, robot, state))
     for view, pictures in expected.items():
         feature = f"observation.images.{view.lower()}"
         shown, _ = decoded(out / f"videos/{feature}/chunk-000/file-000.mp4", SIZE)

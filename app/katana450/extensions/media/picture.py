@@ -29,17 +29,18 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int32]
 Bools = npt.NDArray[np.bool_]
 
+Pixels = npt.NDArray[np.uint8]
+"""A picture: (height, width, 3) sRGB, 0 to 255."""
+
 
 class Item(NamedTuple):
     """A shape in the scene.
 
     Attributes:
-        name: name of the link or object.
         shape: the mesh.
         T: (4, 4) pose of the mesh in the base frame [m].
     """
 
-    name: str
     shape: VisualMesh
     T: FloatArray
 
@@ -49,7 +50,6 @@ class RenderScene:
     """All triangles of a scene.
 
     Attributes:
-        names: name of each item.
         vertices: (v, 3) in the base frame [m].
         normals: (v, 3) unit normals.
         faces: (f, 3) corners, counter-clockwise seen from outside.
@@ -57,7 +57,6 @@ class RenderScene:
         colour: (i, 3) linear colour of each item.
     """
 
-    names: tuple[str, ...]
     vertices: Floats
     normals: Floats
     faces: Ints
@@ -72,7 +71,6 @@ class RenderScene:
         turned = [(item.shape, item.T[:3, :3].T, item.T[:3, 3]) for item in items]
         materials = [shape.material for shape in shapes]
         return cls(
-            tuple(item.name for item in items),
             _stacked([shape.vertices @ R + p for shape, R, p in turned], np.float32),
             _stacked([shape.normals @ R for shape, R, _ in turned], np.float32),
             _stacked(
@@ -386,34 +384,14 @@ class Translucent(NamedTuple):
     opacity: float
 
 
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """A rendered picture.
-
-    Attributes:
-        pixels: (height, width, 3) sRGB, 0 to 255.
-        item: (height, width) item at the middle of each pixel, FLOOR or NOWHERE.
-        names: names of the items, translucent ones last.
-    """
-
-    pixels: npt.NDArray[np.uint8]
-    item: Ints
-    names: tuple[str, ...]
-
-    @property
-    def png(self) -> bytes:
-        """The picture as a PNG file; the same pixels give the same bytes."""
-        file = io.BytesIO()
-        Image.fromarray(self.pixels).save(file, "png")
-        return file.getvalue()
-
-    def shows(self, *names: str) -> Bools:
-        """Return (height, width) whether the middle of a pixel shows one of the items ``names``."""
-        numbers = [number for number, name in enumerate(self.names) if name in names]
-        return np.isin(self.item, numbers)
+def png(pixels: Pixels) -> bytes:
+    """Return ``pixels`` as a PNG file; the same pixels give the same bytes."""
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "png")
+    return file.getvalue()
 
 
-def picture(items: Sequence[Item], translucents: Sequence[Translucent], camera: Camera) -> Picture:
+def picture(items: Sequence[Item], translucents: Sequence[Translucent], camera: Camera) -> Pixels:
     """Return the picture of the items as ``camera`` sees them.
 
     Raises MissingExtraError without embreex.
@@ -453,7 +431,7 @@ class _Renderer:
         self._eye = np.array(camera.position, dtype=np.float32)
 
     @property
-    def picture(self) -> Picture:
+    def picture(self) -> Pixels:
         width, height = self._camera.size
         rows, columns = np.divmod(np.arange(width * height, dtype=np.int32), width)
         samples = self._samples(_spots(columns, 0.5), _spots(rows, 0.5))
@@ -464,11 +442,8 @@ class _Renderer:
                 self._samples(_spots(columns[edge], right), _spots(rows[edge], down)).colours
                 for right, down in CORNERS
             ) / np.float32(len(CORNERS))
-        return Picture(
-            np.rint(255.0 * colours).astype(np.uint8).reshape(height, width, 3),
-            samples.item.reshape(height, width),
-            (*self._solid.names, *self._thin.names),
-        )
+        pixels = np.rint(255.0 * colours).astype(np.uint8)
+        return np.asarray(pixels.reshape(height, width, 3))
 
     def _samples(self, x: Floats, y: Floats) -> _Samples:
         """Return what the rays through x, y (n,) [px] show."""
@@ -480,12 +455,12 @@ class _Renderer:
         light[floor] = floor_light(self._camera, hits.some(floor), reached[floor], light[floor])
         light[solid] = _surface(self._solid, hits.some(solid), reached[solid])
         item = hits.item.copy()
-        if self._thin.names:
+        if len(self._opacity):
             which, surface = hits_behind(self._behind, self._eye, hits)
             # Water has the same illumination as the point behind it.
             shown = _surface(self._thin, surface, reached[which])
             light[which] += self._opacity[surface.item][:, None] * (shown - light[which])
-            item[which] = surface.item + len(self._solid.names)
+            item[which] = surface.item + len(self._solid.colour)
         return _Samples(developed(light), hits, item, reached)
 
     def _edges(self, samples: _Samples) -> Bools:

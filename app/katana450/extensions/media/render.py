@@ -10,7 +10,7 @@ from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.playback import Playback, chosen
 from katana450.extensions.media.film import check_filmable, write_film
-from katana450.extensions.media.picture import check_traceable
+from katana450.extensions.media.picture import check_traceable, png
 from katana450.extensions.media.stage import RenderStage, Shot, rendering_pool
 from katana450.extensions.progress import progress
 from katana450.server.viser_bridge.presets import Preset
@@ -33,7 +33,7 @@ def render(options: argparse.Namespace) -> int:
     if kind == ".png":
         stage = RenderStage(shown.robot, shown.session, load_props())
         rendered = shot.taken(stage, shown.robot, shown.states[-1])
-        write_files({path: writer_of(rendered.png)})
+        write_files({path: writer_of(png(rendered))})
     else:
         _film(path, shown, shot, options)
     print(f"{path}: {path.stat().st_size} bytes")

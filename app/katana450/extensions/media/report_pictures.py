@@ -17,7 +17,7 @@ from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
-from katana450.extensions.media.picture import Camera, Item, picture
+from katana450.extensions.media.picture import Camera, Item, picture, png
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.programs.run.simulation import Simulation
 from katana450.extensions.programs.script.measures import commanded_errors, path_of
@@ -55,7 +55,7 @@ def tube(name: str, points: FloatArray, radius: float, rgb: tuple[int, int, int]
     shape = VisualMesh(
         Material(name, colour), corners, np.zeros_like(corners), faces.astype(np.int64)
     )
-    return Item(name, shape, np.eye(4))
+    return Item(shape, np.eye(4))
 
 
 SIZE = 880, 550
@@ -121,7 +121,7 @@ def stage_pictures(run: Simulation, robot: Robot, props: Props) -> Mapping[str, 
             items += _lines(robot, states[: tick + 1])
             look = ON_PATH
         camera = Camera(*look, FOV, SIZE)
-        pictures[f"{name}.png"] = picture(items, stage.water(state), camera).png
+        pictures[f"{name}.png"] = png(picture(items, stage.water(state), camera))
     return pictures
 
 

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
@@ -28,7 +27,7 @@ from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of, smooth
 from katana450.arm.robot.visual import Visual
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.conduit import ConduitStretch, poses, ring, stretches_of
-from katana450.extensions.media.picture import Camera, Item, Picture, Translucent, picture
+from katana450.extensions.media.picture import Camera, Item, Pixels, Translucent, picture
 from katana450.extensions.water import WaterPart, parts_of
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -47,11 +46,7 @@ MATERIAL = Material("water", (RED / 255.0, GREEN / 255.0, BLUE / 255.0))
 def _translucent(part: WaterPart) -> Translucent:
     faces = part.faces.astype(np.int64)
     shape = VisualMesh(MATERIAL, part.corners, smooth_normals(part.corners, faces), faces)
-    return Translucent(Item(part.name, shape, np.eye(4)), part.opacity)
-
-
-CONDUIT, TABLE = "conduit", "table"
-"""Names of these items; links and objects have their own names."""
+    return Translucent(Item(shape, np.eye(4)), part.opacity)
 
 
 class RenderStage:
@@ -74,9 +69,7 @@ class RenderStage:
         """Return the items of the links."""
         frames = self._frames(state)
         return [
-            Item(name, shape, frames[name])
-            for name, shapes in self._links.items()
-            for shape in shapes
+            Item(shape, frames[name]) for name, shapes in self._links.items() for shape in shapes
         ]
 
     def conduit(self, state: State) -> list[Item]:
@@ -84,7 +77,6 @@ class RenderStage:
         frames, angles = self._frames(state), self._angles(state)
         return [
             Item(
-                CONDUIT,
                 bendable.bent(angles[bendable.stretch.joint.name]),
                 frames[bendable.stretch.start.link],
             )
@@ -94,13 +86,12 @@ class RenderStage:
     def surrounding_items(self, state: State) -> list[Item]:
         """Return the items of the table and the scene objects."""
         x = state.x
-        items = [Item(TABLE, shape, np.eye(4)) for shape in self._table]
+        items = [Item(shape, np.eye(4)) for shape in self._table]
         for scene_object in state.objects:
             if scene_object.appearance.hidden or scene_object.is_zone:
                 continue
             T = self._session.environment.pose(scene_object, x)
-            shapes = self._shapes(scene_object)
-            items += [Item(scene_object.name, shape, T) for shape in shapes]
+            items += [Item(shape, T) for shape in self._shapes(scene_object)]
         return items
 
     def _shapes(self, scene_object: SceneObject) -> Sequence[VisualMesh]:
@@ -167,8 +158,6 @@ def _plain(scene_object: SceneObject) -> VisualMesh:
     return VisualMesh(Material("plain", colour), shape.vertices, shape.normals, shape.faces)
 
 
-Pixels = npt.NDArray[np.uint8]
-
 AHEAD = 4
 """Number of states for each process that are rendered or wait, so that memory stays bounded."""
 
@@ -179,7 +168,7 @@ class Shot(NamedTuple):
     preset: Preset
     size: tuple[int, int]
 
-    def taken(self, stage: RenderStage, robot: Robot, state: State) -> Picture:
+    def taken(self, stage: RenderStage, robot: Robot, state: State) -> Pixels:
         """Return the picture of ``state``."""
         view = camera_pose(self.preset, robot, state)
         camera = Camera(view.position, view.target, float(FOV), self.size)
@@ -254,4 +243,4 @@ def _end_with_parent() -> None:
 def _take(state: State) -> tuple[Pixels, ...]:
     (studio,) = _studios
     stage, robot = studio.stage, studio.robot
-    return tuple(shot.taken(stage, robot, state).pixels for shot in studio.shots)
+    return tuple(shot.taken(stage, robot, state) for shot in studio.shots)
