@@ -73,27 +73,26 @@ class SlowLink:
         line = socket.socket()
         line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW)
         line.setblocking(False)
-        try:
-            await self._loop.sock_connect(line, ("127.0.0.1", self._to_port))
-        except OSError:
-            # The server is down.
-            line.close()
-            back.transport.abort()
-            return
-        far, forth = await asyncio.open_connection(sock=line, limit=WINDOW)
-        tasks = [
-            asyncio.create_task(self._carry(near, forth, 0)),
-            asyncio.create_task(self._carry(far, back, 1)),
-        ]
-        try:
-            with suppress(asyncio.CancelledError):
+        ends, tasks = [back], list[asyncio.Task[None]]()
+        # A server that is down ends the connection, and so does the end of this line.
+        with suppress(OSError, asyncio.CancelledError):
+            try:
+                await self._loop.sock_connect(line, ("127.0.0.1", self._to_port))
+                far, forth = await asyncio.open_connection(sock=line, limit=WINDOW)
+                ends.append(forth)
+                tasks += [
+                    asyncio.create_task(self._carry(near, forth, 0)),
+                    asyncio.create_task(self._carry(far, back, 1)),
+                ]
                 await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-            for end in (forth, back):
-                end.transport.abort()
+            finally:
+                for end in ends:
+                    end.transport.abort()
+                if len(ends) == 1:
+                    line.close()
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _carry(
         self, source: asyncio.StreamReader, to: asyncio.StreamWriter, way: int
