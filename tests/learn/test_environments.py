@@ -57,7 +57,7 @@ def test_arm_of_another_file_has_an_environment(task: str, tmp_path: Path) -> No
     check_env(made(task, urdf=path).unwrapped)
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_equal_seeds_and_actions_give_equal_bits(seed: int) -> None:
     task = list(TASKS)[seed % len(TASKS)]

@@ -112,6 +112,7 @@ def of_three_axes() -> Chain:
     )
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "chain",
     [of_three_axes(), OPENMANIPULATOR_X, SKEWED_6],
