@@ -35,8 +35,7 @@ export class Clearance {
     if (!clearance || !from || !to) return;
     cancelAnimationFrame(this.#frame);
     this.#frame = requestAnimationFrame(() => this.#draw());
-    const { offsetLeft, offsetTop } = this.#scene;
-    const ends = [from, to].map(([x, y]) => [offsetLeft + x, offsetTop + y]);
+    const ends = [from, to];
     ends.forEach(([x, y], i) => {
       set(this.#line, `x${i + 1}`, x);
       set(this.#line, `y${i + 1}`, y);
@@ -46,7 +45,7 @@ export class Clearance {
     write(this.#label, `${clearance.distance.toFixed(1)} mm`);
     // To its left: the label of a drag is at the right of the pointer.
     const left = Math.min(ends[0][0], ends[1][0]) - BESIDE - this.#label.offsetWidth;
-    this.#label.style.left = `${Math.max(offsetLeft, left)}px`;
+    this.#label.style.left = `${Math.max(0, left)}px`;
     this.#label.style.top = `${(ends[0][1] + ends[1][1] - this.#label.offsetHeight) / 2}px`;
   }
 }

@@ -1,0 +1,121 @@
+"""The dock of the sheets: its side and what was open, which the browser remembers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import FloatRect, Page
+
+from tests.browser.camera import Drawing
+from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+from tests.browser.session import MOVE
+from tests.browser.sight import wait_whole
+from tests.browser.sizes import PHONE, PORTRAIT, WIDE
+from tests.browser.test_accessibility import findings
+
+SMALL = (1024, 768)
+"""Size [px] of a window in which viser's panel and the dock leave little to the picture."""
+
+NARROWEST = 300.0
+"""[px] Minimum width of the dock."""
+
+
+def box(page: Page, selector: str) -> FloatRect:
+    area = page.locator(selector).bounding_box()
+    assert area is not None, f"{selector} is not shown"
+    return area
+
+
+def width(page: Page) -> float:
+    return box(page, "#dock")["width"]
+
+
+def choose_side(page: Page, side: str) -> None:
+    page.click("#more-button")
+    page.get_by_label("Side of the sheets").select_option(side)
+    page.click("#more-button")
+
+
+@pytest.fixture
+def alone(server: AppServer, open_page: OpenPage) -> Page:
+    """Return a new window with our page alone."""
+    page = open_page(server.url, window=WIDE, drawing=Drawing.NONE).page
+    # Names of viser's page, which belong to ours.
+    page.route("**/static/viser/**", lambda route: route.continue_())
+    return page
+
+
+def test_side_and_open_sheets_survive_a_reload(alone: Page) -> None:
+    alone.click("#jog-button")
+    alone.click("#teach-button")
+    alone.locator("#teach").wait_for()
+    choose_side(alone, "left")
+    assert box(alone, "#dock")["x"] == 0.0
+    assert box(alone, "#stage")["x"] == pytest.approx(width(alone), abs=1.0)
+    before = box(alone, "#dock")
+    alone.reload()
+    for sheet in ("#jog", "#teach"):
+        alone.locator(sheet).wait_for()
+    assert box(alone, "#dock") == before
+    # What was closed stays closed.
+    alone.click("#teach-button")
+    alone.click("#jog-button")
+    alone.reload()
+    alone.locator("#teach-button").wait_for()
+    assert not alone.locator("#dock").is_visible()
+    choose_side(alone, "right")
+    alone.click("#jog-button")
+    assert box(alone, "#stage")["x"] == 0.0
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("size", [WIDE, SMALL])
+def test_arm_is_whole_between_dock_and_panel(
+    server: AppServer, open_page: OpenPage, size: tuple[int, int], side: str, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE), window=size, own_camera=True)
+    window = page.page
+    choose_side(window, side)
+    window.click("#jog-button")
+    wait_whole(page, f"with the dock at the {side}")
+    picture = canvas(page)
+    first = width(window)
+    # Beside viser's panel, the picture has half of the page, and in a small window the most.
+    assert picture["width"] >= size[0] / 2 or first == NARROWEST
+    # Everything in the sheet is inside.
+    window.locator("#gripper button").first.wait_for()
+    inner, outer = window.evaluate("() => [jog.scrollWidth, jog.clientWidth]")
+    assert inner <= outer
+    page.keep(artefacts / f"dock-{side}-{size[0]}.png")
+    assert findings(window) == []
+    assert page.errors == []
+
+
+def canvas(page: ViserPage) -> FloatRect:
+    """Return the place of the picture in viser's document [px]."""
+    area: FloatRect = page.frame.evaluate(
+        """() => {
+            const { x, y, width, height } = __viserMutable.canvas.getBoundingClientRect();
+            return { x, y, width, height };
+        }"""
+    )
+    return area
+
+
+def test_phone_opens_no_sheet_and_keeps_it_below(server: AppServer, open_page: OpenPage) -> None:
+    script = """
+        localStorage.setItem("katana450.sheets.open", "jog");
+        localStorage.setItem("katana450.sheets.side", "left");
+    """
+    phone = {"window": PORTRAIT, "drawing": Drawing.NONE, "script": script, **PHONE}
+    page = open_page(server.url, **phone).page
+    page.locator("#teach-button").wait_for()
+    assert not page.locator("#dock").is_visible()
+    page.tap("#jog-button")
+    assert width(page) == PORTRAIT[0]
+    assert box(page, "#scene")["y"] < box(page, "#dock")["y"]
+    page.tap("#more-button")
+    assert not page.get_by_label("Side of the sheets").is_visible()
