@@ -1,4 +1,4 @@
-"""Planning of branch changes in a thread of its own; the arm follows the plan once it is found."""
+"""Planning of motions in a thread of its own; the arm follows the plan once it is found."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class PlanningWorker:
         left = actor is not None and actor.grounds is Grounds.SERVER and command == cmd.Hold()
         if any(part.supersedes for part in traits) and not left:
             self.redirected()
-        if isinstance(command, cmd.Branch):
+        if command.traits.planned:
             self._session.check(command)
             self._plan(command, actor)
             return self.last_ticket
@@ -83,7 +83,7 @@ class PlanningWorker:
                 self._work.set()
                 self._work = None
 
-    def _plan(self, command: cmd.Branch, actor: Actor | None) -> None:
+    def _plan(self, command: cmd.Command, actor: Actor | None) -> None:
         cancelled = threading.Event()
         with self._lock:
             self._work = cancelled
@@ -91,7 +91,7 @@ class PlanningWorker:
             target=self._find, args=(command, actor, cancelled), name="planning", daemon=True
         ).start()
 
-    def _find(self, command: cmd.Branch, actor: Actor | None, cancelled: threading.Event) -> None:
+    def _find(self, command: cmd.Command, actor: Actor | None, cancelled: threading.Event) -> None:
         waited = self._state_publisher.snapshot.state.waits
         try:
             state = self._at_rest(actor, cancelled)
@@ -110,17 +110,20 @@ class PlanningWorker:
                 if self._work is cancelled:
                     self._work = None
 
-    def _plan_of(self, command: cmd.Branch, state: State) -> Plan | None:
+    def _plan_of(self, command: cmd.Command, state: State) -> Plan | None:
         """Return the plan of ``command`` from the rest of ``state``; None if nothing has to move.
 
         Raises InputError if the arm cannot do it, and BlockedError without a clear path.
         """
         arm, world = self._session.require_arm(), self._session.world_at(state)
-        goal = with_branch(arm, state, branch_named(arm, command.name)).goal
-        # At a stretched elbow two branches are one posture, but for rounding.
-        if (np.abs(goal - state.setpoint) <= START_TOLERANCE).all():
-            return None
-        return plan_to(arm, world, state, goal)
+        match command:
+            case cmd.Branch(name=name):
+                goal = with_branch(arm, state, branch_named(arm, name)).goal
+                # At a stretched elbow two branches are one posture, but for rounding.
+                if (np.abs(goal - state.setpoint) <= START_TOLERANCE).all():
+                    return None
+                return plan_to(arm, world, state, goal)
+        raise AssertionError(f"There is no plan for {command!r}.")
 
     def _fail(self, why: str) -> None:
         self.failure = why
