@@ -61,7 +61,7 @@ def expected_pictures(folder: Path, dataset: Path) -> dict[str, npt.NDArray[Any]
             for state in RecordedStates(file, session).at(file.start + BEGIN + frames / FPS):
                 for view in VIEWS:
                     shot = Shot(Preset[view.upper()], SIZE)
-                    taken[view].append(shot.taken(stage, robot, state).pixels)
+                    taken[view].append(shot.taken(stage, robot, state))
     pictures = {
         f"pictures observation.images.{view}": np.array(each) for view, each in taken.items()
     }
