@@ -11,7 +11,6 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
-from katana450.extensions.general_arms.links import reversed_chain
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import errors_of, forward_batch
@@ -32,7 +31,7 @@ ROTATION = 1e-12
 ROUNDED = 2e-16
 """[rad], [m] Rounding of a pose."""
 
-ARMS = FOUR | SIX | {"Puma 560 seen from the tool": reversed_chain(PUMA_560)}
+ARMS = FOUR | SIX
 KINDS = {
     f"{arm}, {kind}": (chain, function(chain))
     for arms, functions in (

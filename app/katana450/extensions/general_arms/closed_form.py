@@ -14,7 +14,7 @@ import numpy.typing as npt
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.functions import ARRAYS, FLOATS, Operations
-from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
+from katana450.extensions.general_arms.links import DHLinks
 from katana450.extensions.general_arms.parallel_axes import (
     LOOSE,
     four_axes,
@@ -107,26 +107,16 @@ class ClosedForm(Kinematics):
 
     Attributes:
         chain: the chain.
-        form: the closed form, of the chain or of the chain seen from the tool.
-        is_reversed: whether it is that of the chain seen from the tool.
+        form: the closed form.
     """
 
     form: Form
-    is_reversed: bool = False
 
     @staticmethod
     def of(chain: Chain, links: DHLinks) -> ClosedForm | str:
         """Return the closed form of `chain`, or the conditions that it misses."""
         form = form_of(links)
-        if isinstance(form, Form):
-            return ClosedForm(chain, form)
-        if chain.n != 6:
-            return form
-        mirrored = form_of(links_of(reversed_chain(chain)))
-        if isinstance(mirrored, Form):
-            method = f"{mirrored.method}, seen from the tool"
-            return ClosedForm(chain, mirrored._replace(method=method), is_reversed=True)
-        return form
+        return form if isinstance(form, str) else ClosedForm(chain, form)
 
     @property
     def method(self) -> str:
@@ -145,7 +135,7 @@ class ClosedForm(Kinematics):
     @cached_property
     def branches(self) -> tuple[str, ...]:
         """Names of the branches, in the order of the solutions; see branch_words.py."""
-        words = BranchWords(self.chain, tuple(range(self.chain.n)), self.is_reversed)
+        words = BranchWords(self.chain, tuple(range(self.chain.n)))
         return words.in_order(lambda T, q: np.array(self.solve(T, q.tolist())))
 
     @cached_property
@@ -168,29 +158,26 @@ class ClosedForm(Kinematics):
 
         It takes a pose (4, 4) and the canonical angles that are used where it leaves them free.
         """
-        form, is_reversed = self.form, self.is_reversed
+        form = self.form
         solve = form.build(form.links, FLOATS)
         before, after = form.links.T_1_S, form.T_after
 
         def canonical(T: FloatArray, free: Sequence[float]) -> Iterable[Angles]:
-            pose = se3.inverse(T) if is_reversed else T
             # For one pose `dot` takes half the time of `@`.
-            return solve(before.dot(pose).dot(after).tolist(), free)
+            return solve(before.dot(T).dot(after).tolist(), free)
 
         return canonical
 
     @cached_property
     def _joints(self) -> Callable[[Sequence[float]], Angles]:
         """A function for the joint angles [rad] of canonical angles."""
-        shift, is_reversed = self.form.links.shift, self.is_reversed
+        shift = self.form.links.shift
         ends = zip(self.chain.lower.tolist(), self.chain.upper.tolist(), strict=True)
         limits = [(k, *end) for k, end in enumerate(ends) if another_turn_helps(*end)]
         remainder, tau = math.remainder, math.tau
 
         def joints(alpha: Sequence[float]) -> Angles:
             q = [remainder(angle - offset, tau) for angle, offset in zip(alpha, shift, strict=True)]
-            if is_reversed:
-                q.reverse()
             for joint, lower, upper in limits:
                 q[joint] = in_turn(q[joint], lower, upper)
             return tuple(q)
@@ -206,7 +193,7 @@ class ClosedForm(Kinematics):
         """
         alpha = shift = self.form.links.shift
         if free is not None:
-            alpha = tuple(map(float.__add__, free[::-1] if self.is_reversed else free, shift))
+            alpha = tuple(map(float.__add__, free, shift))
         canonical, joints = self._canonical, self._joints
         q = [joints(angles) for angles in canonical(T, alpha)]
         if not self.rounding.is_corrected:
@@ -264,31 +251,20 @@ class ClosedForm(Kinematics):
         return self._exact_batch(poses)[:, branch]
 
     def _exact_batch(self, poses: FloatArray) -> FloatArray:
-        chain_poses = inverses(poses) if self.is_reversed else poses
         shift = self.form.links.shift
         with np.errstate(all="ignore"):
             solutions = [
                 *self._solve_arrays(
-                    np.moveaxis(self.form.links.T_1_S @ chain_poses @ self.form.T_after, 0, -1),
+                    np.moveaxis(self.form.links.T_1_S @ poses @ self.form.T_after, 0, -1),
                     shift,
                 )
             ]
         zeros = np.zeros(len(poses))
         alpha = np.array([[angle + zeros for angle in angles] for angles in solutions])
-        q = alpha.transpose(2, 0, 1) - shift
-        q = in_limits_turns(self.chain, q[:, :, ::-1] if self.is_reversed else q)
+        q = in_limits_turns(self.chain, alpha.transpose(2, 0, 1) - shift)
         if self.form.build is six_axes:
             # Where axes 4 and 6 are in line, case distinctions keep axis 4 in reach.
             in_line = (np.abs(np.sin(alpha[:, 4])) < LOOSE).any(axis=0)
             for number in np.flatnonzero(in_line).tolist():
                 q[number] = list(map(self._joints, self._canonical(poses[number], shift)))
         return q
-
-
-def inverses(T: FloatArray) -> FloatArray:
-    """Return the inverse poses of `T` (N, 4, 4)."""
-    result = np.zeros_like(T)
-    result[:, :3, :3] = T[:, :3, :3].swapaxes(1, 2)
-    result[:, :3, 3] = -(result[:, :3, :3] @ T[:, :3, 3:])[:, :, 0]
-    result[:, 3, 3] = 1.0
-    return result

@@ -29,7 +29,6 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
-from katana450.extensions.general_arms.closed_form import inverses
 from katana450.extensions.general_arms.functions import ARRAYS, Operations
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.numerical import search_of
@@ -183,7 +182,7 @@ class SevenAxes(Kinematics):
     def _rows(self, T: FloatArray) -> FloatArray:
         """Return poses (..., 4, 4) as the formulas read them."""
         if self.is_reversed:
-            T = se3.inverse(T) if T.ndim == 2 else inverses(T)
+            T = se3.inverse(T) if T.ndim == 2 else _inverses(T)
         before, after = self.links.T_1_S, self.links.T_tool_n
         return np.asarray(before.dot(T).dot(after) if T.ndim == 2 else before @ T @ after)
 
@@ -357,3 +356,12 @@ def _turned_back(alpha: FloatArray) -> FloatArray:
     turns[:, 1, 0] = -sine
     turns[:, 2, 2] = turns[:, 3, 3] = 1.0
     return turns
+
+
+def _inverses(T: FloatArray) -> FloatArray:
+    """Return the inverse poses of `T` (N, 4, 4)."""
+    result = np.zeros_like(T)
+    result[:, :3, :3] = T[:, :3, :3].swapaxes(1, 2)
+    result[:, :3, 3] = -(result[:, :3, :3] @ T[:, :3, 3:])[:, :, 0]
+    result[:, 3, 3] = 1.0
+    return result
