@@ -35,6 +35,7 @@ from tests.general_arms.published_arms import (
     SKEWED,
     UR5E,
 )
+from tests.geometry.strategies import exp
 from tests.ticks import TICK
 
 ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED}
@@ -105,7 +106,7 @@ def test_tool_is_moved_and_turned(chain: Chain, name: str) -> None:
 @every(FOUR)
 def test_four_axes_keep_the_pitch_in_a_drag(chain: Chain) -> None:
     session, start, T = ready(chain)
-    aside = (se3.exp(0.7 * chain.S[:, 0]) @ T)[:3, 3]
+    aside = (exp(0.7 * chain.S[:, 0]) @ T)[:3, 3]
     state = settled(session, start, [cmd.Position(aside)])
     np.testing.assert_allclose(pose(session, state)[:3, 3], aside, atol=1e-7)
     # The tool is in the plane that turns with axis 1, so all other joints stay.

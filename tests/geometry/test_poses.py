@@ -16,6 +16,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from tests.geometry.strategies import (
     angles,
     directions,
+    exp,
     points,
     repeatable,
     rotation_vectors,
@@ -24,9 +25,9 @@ from tests.geometry.strategies import (
 
 
 def test_a_twist_is_angular_part_first() -> None:
-    T = se3.exp([0.0, 0.0, math.pi / 2, 0.0, 0.0, 0.0])
+    T = exp([0.0, 0.0, math.pi / 2, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(T[:3, :3] @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=1e-15)
-    T = se3.exp([0.0, 0.0, 0.0, 1.0, 2.0, 3.0])
+    T = exp([0.0, 0.0, 0.0, 1.0, 2.0, 3.0])
     np.testing.assert_array_equal(T, se3.from_rotation_translation(np.eye(3), [1.0, 2.0, 3.0]))
 
 
@@ -41,30 +42,30 @@ def test_exp_is_the_matrix_exponential(V: FloatArray) -> None:
         expected = expected + term
     for _ in range(10):
         expected = expected @ expected
-    np.testing.assert_allclose(se3.exp(V), expected, atol=2e-12)
+    np.testing.assert_allclose(exp(V), expected, atol=2e-12)
 
 
 @repeatable
 @given(twists)
 def test_log_undoes_exp(V: FloatArray) -> None:
-    back = se3.log(se3.exp(V))
+    back = se3.log(exp(V))
     if np.linalg.norm(V[:3]) < math.pi - 1e-12:
         np.testing.assert_allclose(back, V, atol=4e-14)
-    np.testing.assert_allclose(se3.exp(back), se3.exp(V), atol=2e-14)
+    np.testing.assert_allclose(exp(back), exp(V), atol=2e-14)
 
 
 @repeatable
 @given(twists)
 def test_inverse(V: FloatArray) -> None:
-    T = se3.exp(V)
+    T = exp(V)
     np.testing.assert_allclose(T @ se3.inverse(T), np.eye(4), atol=1e-14)
-    np.testing.assert_allclose(se3.inverse(T), se3.exp(-V), atol=1e-14)
+    np.testing.assert_allclose(se3.inverse(T), exp(-V), atol=1e-14)
 
 
 @repeatable
 @given(twists, twists)
 def test_adjoint_carries_twists_between_frames(V: FloatArray, W: FloatArray) -> None:
-    T = se3.exp(V)
+    T = exp(V)
     moved = T @ se3.hat(W) @ se3.inverse(T)
     np.testing.assert_allclose(se3.hat(se3.adjoint(T) @ W), moved, atol=1e-13)
 
@@ -246,7 +247,7 @@ def test_a_revolute_screw_keeps_its_axis_and_turns_the_rest(
 ) -> None:
     S = screws.revolute(3.0 * omega, r)
     assert screws.pitch(S) == pytest.approx(0.0, abs=1e-15)
-    T = se3.exp(S * theta)
+    T = exp(S * theta)
     np.testing.assert_allclose(T[:3, :3] @ r + T[:3, 3], r, atol=1e-14)
     moved = r + np.cross(omega, [0.3, 0.5, -0.2])
     turned = T[:3, :3] @ moved + T[:3, 3]
@@ -267,7 +268,7 @@ def test_point_on_is_the_foot_of_the_origin(omega: FloatArray, r: FloatArray) ->
 def test_moved_is_the_axis_of_the_moved_point_and_direction(
     omega: FloatArray, r: FloatArray, V: FloatArray
 ) -> None:
-    T = se3.exp(V)
+    T = exp(V)
     expected = screws.revolute(T[:3, :3] @ omega, T[:3, :3] @ r + T[:3, 3])
     np.testing.assert_allclose(screws.moved(T, screws.revolute(omega, r)), expected, atol=1e-13)
 

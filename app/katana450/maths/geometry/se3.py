@@ -1,4 +1,4 @@
-"""Rigid motions: SE(3), its exponential and logarithm, and twists.
+"""Rigid motions: SE(3), its logarithm, and twists.
 
 A pose T_a_b is a (4, 4) float64 matrix that maps coordinates of {b} into {a}; lengths in m, angles
 in rad. A twist V (6,) is (omega, v): the angular part first. Source: Lynch & Park, Modern Robotics
@@ -38,11 +38,6 @@ def hat(V: npt.ArrayLike) -> FloatArray:
     return X
 
 
-def vee(X: FloatArray) -> FloatArray:
-    """Return the twist (omega, v) (6,) of a (4, 4) matrix: the inverse of `hat`."""
-    return np.concatenate((so3.vee(X[:3, :3]), X[:3, 3]))
-
-
 def from_rotation_translation(R: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
     """Return the pose with rotation `R` (3, 3) and position `p` (3,) [m]."""
     T = np.eye(4)
@@ -65,26 +60,8 @@ def adjoint(T: FloatArray) -> FloatArray:
     return A
 
 
-def exp(V: npt.ArrayLike) -> FloatArray:
-    """Return the motion along the twist V = (omega, v) (6,) for unit time.
-
-    For a screw axis S, exp(S q) is the motion by the angle q. The coefficient of hat(omega)^2 loses
-    digits near 0 only as fast as hat(omega)^2 itself vanishes, so no series is needed.
-    """
-    V = np.asarray(V, dtype=np.float64)
-    w, v = V[:3], V[3:]
-    theta = math.hypot(*w)
-    a = so3.sinc(theta)
-    b = 0.5 * so3.sinc(0.5 * theta) ** 2
-    square = theta * theta
-    c = (1.0 - a) / square if square else 1.0 / 6.0
-    W = so3.hat(w)
-    Wv = W @ v
-    return from_rotation_translation(so3.exp(w), v + b * Wv + c * (W @ Wv))
-
-
 def log(T: FloatArray) -> FloatArray:
-    """Return the twist (omega, v) (6,) with exp(V) == T and |omega| <= pi."""
+    """Return the twist V = (omega, v) (6,) with exp(hat(V)) == T and |omega| <= pi."""
     w = so3.log(T[:3, :3])
     p = T[:3, 3]
     theta = math.hypot(*w)
