@@ -125,14 +125,6 @@ MEASURES: Final = (
 )
 """Name of each measure, with its unit at the end; docs/recording.md defines them."""
 
-HIGHER_IS_BETTER: Final = frozenset(
-    (
-        "sparc", "nearest_clearance_mm", "margin_to_limits_deg", "smallest_singular_value",
-        "emptied_ml", "emptied_percent",
-    )
-)  # fmt: skip
-"""Measures of which the highest value is the best; of all others it is the lowest."""
-
 CLEARANCE_PERIOD = 0.05
 """[s] Period of the clearance samples."""
 
@@ -304,21 +296,8 @@ def _begins(flags: Sequence[bool]) -> int:
     return sum(now and not before for before, now in zip((False, *flags), flags, strict=False))
 
 
-BEST = "*"
-"""Mark of the best value of a measure."""
-
 DIGITS = 4
 """Significant digits of a value."""
-
-
-def is_best(scores: Sequence[Scored], score: Scored, measure: str) -> bool:
-    """Return whether ``score`` has the best ``measure`` of ``scores``, and another a worse one."""
-    known = [value for row in scores if (value := row.values[measure]) is not None]
-    value = score.values[measure]
-    # Values that differ by rounding are equal.
-    if value is None or len(set(map(shown, known))) < 2:
-        return False
-    return shown(value) == shown((max if measure in HIGHER_IS_BETTER else min)(known))
 
 
 def table_of(scores: Sequence[Scored]) -> list[str]:
@@ -327,21 +306,14 @@ def table_of(scores: Sequence[Scored]) -> list[str]:
     for measure in MEASURES:
         if all(score.values[measure] is None for score in scores):
             continue
-        cells = [
-            shown(score.values[measure]) + (f" {BEST}" if is_best(scores, score, measure) else "  ")
-            for score in scores
-        ]
-        table.append([f"{name_of(measure)} {unit_of(measure)}".rstrip(), *cells])
+        name = "SPARC" if measure == "sparc" else title_of(measure)
+        cells = [shown(score.values[measure]) for score in scores]
+        table.append([f"{name} {unit_of(measure)}".rstrip(), *cells])
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return [
         "  ".join((row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:]))).rstrip()
         for row in table
     ]
-
-
-def name_of(measure: str) -> str:
-    """Return the name of ``measure`` for people, without its unit."""
-    return "SPARC" if measure == "sparc" else title_of(measure)
 
 
 def shown(value: float | None) -> str:
@@ -365,8 +337,6 @@ def score_files(options: Namespace) -> int:
         return 0
     for line in table_of(scores):
         print(printable(line))
-    if len(scores) > 1:
-        print(f"Sorted by duration; {BEST} marks the best.")
     return 0
 
 
