@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
-from katana450.extensions.recording.datasets.sampling import RecordedStates, frame_times, sampled
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.table import columns
+from katana450.extensions.recording.files.table import RecordedStates, columns, frame_times, sampled
 from katana450.extensions.recording.folders import new_folder
 from katana450.maths.geometry.arrays import FloatArray
 from tests.recording.dataset_files import episode, episode_folder, write_copy

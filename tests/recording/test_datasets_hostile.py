@@ -16,9 +16,9 @@ from katana450.cli.main import main
 from katana450.errors import KatanaError
 from katana450.extensions.recording.datasets.lerobot_export import LerobotOptions, export_lerobot
 from katana450.extensions.recording.datasets.ros_bag import write_bag
-from katana450.extensions.recording.datasets.sampling import RecordedStates
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.simulation import verify_recording
+from katana450.extensions.recording.files.table import RecordedStates
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.messages import CHECKPOINTS, COMMANDS, EPISODES, EVENTS, STATE
 from tests.conftest import LONG

@@ -21,8 +21,8 @@ from katana450.extensions.media.options import CAMERAS
 from katana450.extensions.media.stage import RenderStage, Shot
 from katana450.extensions.recording.datasets.lerobot_export import EpisodeVideo
 from katana450.extensions.recording.datasets.lerobot_writer import QUANTILES, PixelCounts
-from katana450.extensions.recording.datasets.sampling import RecordedStates
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.table import RecordedStates
 from katana450.extensions.recording.options import VIEWS
 from katana450.server.viser_bridge.presets import Preset
 from tests.media.test_files import HEIGHT, WIDTH, decoded, frames

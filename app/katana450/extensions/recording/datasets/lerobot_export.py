@@ -25,17 +25,17 @@ from katana450.extensions.recording.datasets.lerobot_writer import (
     PixelCounts,
     arrow,
 )
-from katana450.extensions.recording.datasets.sampling import (
+from katana450.extensions.recording.episodes.episode import JUDGED, EpisodeOutcome
+from katana450.extensions.recording.episodes.episode_folder import episodes_in
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import check_whole
+from katana450.extensions.recording.files.table import (
     RecordedStates,
     check_fps,
     columns_from,
     frame_times,
     sampled,
 )
-from katana450.extensions.recording.episodes.episode import JUDGED, EpisodeOutcome
-from katana450.extensions.recording.episodes.episode_folder import episodes_in
-from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.simulation import check_whole
 from katana450.extensions.recording.folders import new_folder
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -313,13 +313,19 @@ def export_lerobot(
             for _ in episode.times:
                 for video, picture in zip(videos, next(pictures), strict=True):
                     video.add(picture)
-            _add(writer, episode, shape, videos)
+            columns: dict[str, object] = {}
+            statistics = {}
+            for feature, video in zip(shape.videos.values(), videos, strict=True):
+                row, statistics[feature] = video.end_episode()
+                columns.update(row)
+            task, success = episode.cut.task, episode.cut.success
+            writer.add_episode(episode.state, episode.action, task, success, columns, statistics)
         # The last step of the progress.
         next(pictures, None)
         for video in videos:
             video.finish()
-        statistics = [video.counts.statistics for video in videos]
-        writer.finish(dict(zip(shape.videos.values(), statistics, strict=True)))
+        whole = [video.counts.statistics for video in videos]
+        writer.finish(dict(zip(shape.videos.values(), whole, strict=True)))
     successes, unjudged = (sum(cut.success is value for cut in cuts) for value in (True, None))
     return Exported(len(cuts), count, successes, unjudged)
 
@@ -370,18 +376,3 @@ def _states(cuts: Sequence[EpisodeCut], fps: int, session: Session) -> Iterator[
         with RecordingFile.open(cut.path) as file:
             times = frame_times(cut.start, cut.end, fps)
             yield from RecordedStates(file, session).at(times)
-
-
-def _add(
-    writer: LerobotWriter,
-    episode: _Episode,
-    shape: DatasetShape,
-    videos: Sequence[EpisodeVideo],
-) -> None:
-    columns: dict[str, object] = {}
-    statistics = {}
-    for feature, video in zip(shape.videos.values(), videos, strict=True):
-        row, statistics[feature] = video.end_episode()
-        columns.update(row)
-    cut = episode.cut
-    writer.add_episode(episode.state, episode.action, cut.task, cut.success, columns, statistics)

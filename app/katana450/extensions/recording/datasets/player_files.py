@@ -19,8 +19,8 @@ from katana450.extensions.media.film import check_filmable, write_film
 from katana450.extensions.media.picture import check_traceable
 from katana450.extensions.media.stage import Shot, rendering_pool
 from katana450.extensions.progress import progress
-from katana450.extensions.recording.datasets.sampling import RecordedStates, frame_times
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.table import RecordedStates, frame_times
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.sdk import Preset

@@ -25,7 +25,6 @@ from katana450.extensions.recording.datasets.lerobot_export import (
     files_of,
 )
 from katana450.extensions.recording.datasets.ros_bag import write_bag
-from katana450.extensions.recording.datasets.sampling import frame_times
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episodes_in
 from katana450.extensions.recording.files.header import (
@@ -36,7 +35,7 @@ from katana450.extensions.recording.files.header import (
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.simulation import session_for, verified
-from katana450.extensions.recording.files.table import write_csv
+from katana450.extensions.recording.files.table import frame_times, write_csv
 from katana450.extensions.recording.files.trimming import keep, trim
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.options import (
