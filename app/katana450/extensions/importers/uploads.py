@@ -129,10 +129,7 @@ class Uploads:
 
     async def _mesh(self, request: Request) -> Response:
         query = request.query_params
-        name, unit, format = query.get("name", ""), query.get("unit"), query.get("format")
-        main = query.get("main", "")
-        if format and not name.lower().endswith(f".{format}"):
-            name = f"{name or 'shape'}.{format}"
+        name, unit, main = query.get("name", ""), query.get("unit"), query.get("main", "")
 
         async def keep() -> answers.Answer:
             if max(len(name), len(main) // 4) > 4 * LONGEST_NAME:
