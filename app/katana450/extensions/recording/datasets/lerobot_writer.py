@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -207,29 +207,19 @@ def _scalar(kind: str) -> dict[str, Any]:
     return {"dtype": kind, "shape": [1], "names": None}
 
 
-def pandas_metadata(index: str, columns: Sequence[str]) -> bytes:
-    """Return the metadata by which pandas reads the text column ``index`` as the index.
-
-    ``columns``: names of the other columns, which are int64.
-    """
-    described = [
-        {
-            "name": name,
-            "field_name": name,
-            "pandas_type": "int64",
-            "numpy_type": "int64",
-            "metadata": None,
-        }
-        for name in columns
-    ]
+def pandas_metadata() -> bytes:
+    """Return the metadata by which pandas reads the texts of the table of tasks as its index."""
+    number = {"pandas_type": "int64", "numpy_type": "int64", "metadata": None}
     text = {"pandas_type": "unicode", "numpy_type": "object"}
-    described.append({"name": None, "field_name": index, **text, "metadata": None})
     names = {"name": None, "field_name": None, **text, "metadata": {"encoding": "UTF-8"}}
     return json.dumps(
         {
-            "index_columns": [index],
+            "index_columns": [TASK_COLUMN],
             "column_indexes": [names],
-            "columns": described,
+            "columns": [
+                {"name": TASK, "field_name": TASK, **number},
+                {"name": None, "field_name": TASK_COLUMN, **text, "metadata": None},
+            ],
             "creator": {"library": "pyarrow", "version": "0"},
             "pandas_version": "2.0.0",
         }
@@ -345,10 +335,10 @@ class LerobotWriter:
         self.close()
         pa, folder = self._arrow, self._folder
         tasks = pa.table(
-            {"task_index": pa.array(list(self._tasks.values()), pa.int64())}
+            {TASK: pa.array(list(self._tasks.values()), pa.int64())}
             | {TASK_COLUMN: pa.array(list(self._tasks), pa.string())}
         )
-        pandas = {b"pandas": pandas_metadata(TASK_COLUMN, ["task_index"])}
+        pandas = {b"pandas": pandas_metadata()}
         episodes = pa.Table.from_pylist(self._rows, self._episode_schema())
         for path, table in (
             (TASKS_PATH, tasks.replace_schema_metadata(pandas)),

@@ -60,12 +60,6 @@ class RunDifference(NamedTuple):
     tool: list[float]
 
 
-def times_of(length: float) -> list[float]:
-    """Return the times of the points of a plot over ``length`` [s]."""
-    times: list[float] = np.linspace(0.0, max(length, 0.0), MAX_POINTS).tolist()
-    return times
-
-
 def difference(
     times: Sequence[float],
     first: Sequence[StateRow | None],
@@ -198,7 +192,7 @@ class PlaybackRoutes:
                 length_of(run.spans) - place
                 for run, place in zip((first, second), places, strict=True)
             ]
-            times = times_of(min(left))
+            times = np.linspace(0.0, max(min(left), 0.0), MAX_POINTS).tolist()
             one, other = (
                 _rows(run, place, times) for run, place in zip((first, second), places, strict=True)
             )
