@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from katana450.extensions.recording.folders import default_episodes_folder, default_folder
+from katana450.extensions.recording.folders import default_folder
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def test_default_folders_are_those_of_the_system(
         monkeypatch.setenv(name, value.format(home=tmp_path))
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.setattr(sys, "platform", platform)
-    folder, episodes = default_folder(8080), default_episodes_folder(8080)
+    folder, episodes = default_folder(8080), default_folder(8080, "episodes")
     monkeypatch.undo()
     assert folder == tmp_path / expected / "katana450" / "recordings" / "port-8080"
     assert episodes == tmp_path / expected / "katana450" / "episodes" / "port-8080"

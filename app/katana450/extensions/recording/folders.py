@@ -16,14 +16,9 @@ from katana450.platform_support import claim_file, state_folder
 SUFFIX = ".mcap"
 
 
-def default_folder(port: int) -> Path:
-    """Return the folder of the ring of the server on ``port``."""
-    return state_folder() / "katana450" / "recordings" / f"port-{port}"
-
-
-def default_episodes_folder(port: int) -> Path:
-    """Return the folder of the episodes of the server on ``port``."""
-    return state_folder() / "katana450" / "episodes" / f"port-{port}"
+def default_folder(port: int, content: str = "recordings") -> Path:
+    """Return the folder of the ring, or of the episodes, of the server on ``port``."""
+    return state_folder() / "katana450" / content / f"port-{port}"
 
 
 def recordings_in(folder: Path) -> list[Path]:

@@ -68,9 +68,9 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
 
 def _episodes_folder(options: Namespace, port: int) -> Path:
     """Return the folder of the episodes of the server on ``port``."""
-    from katana450.extensions.recording.folders import default_episodes_folder
+    from katana450.extensions.recording.folders import default_folder
 
-    folder: Path = options.episodes or default_episodes_folder(port)
+    folder: Path = options.episodes or default_folder(port, "episodes")
     # Each process of the server may have another working directory.
     return folder.absolute()
 
