@@ -17,7 +17,7 @@ from katana450 import tolerances
 from katana450.maths.kinematics.arm import Five
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.canonical_target import CanonicalTarget, PlaneOrientation
-from katana450.maths.kinematics.planar import Interval, LimitedArm, PlanarArm, Posture
+from katana450.maths.kinematics.planar import Interval, LimitedArm, PlanarArm, Posture, directions
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.turns import wrapped
 
@@ -56,30 +56,18 @@ def _straight(planar: PlanarArm, phi: float, wrist: tuple[float, float]) -> Iter
     on_axis = planar.axis - planar.l3 * math.cos(phi)
     for theta3 in planar.theta3.ends:
         x, y = l1 + l2 * math.cos(theta3), l2 * math.sin(theta3)
-        for direction in _directions((0.0, 0.0), math.hypot(x, y), wrist, on_axis):
+        for direction in directions((0.0, 0.0), math.hypot(x, y), wrist, on_axis):
             yield direction - math.atan2(y, x), theta3
     for theta2 in planar.theta2.ends:
         elbow = l1 * math.cos(theta2), l1 * math.sin(theta2)
-        for direction in _directions(elbow, l2, wrist, on_axis):
+        for direction in directions(elbow, l2, wrist, on_axis):
             yield theta2, direction - theta2
     for theta4 in planar.theta4.ends:
         # The forearm keeps its direction, and the wrist moves as the elbow does.
         forearm = phi - theta4
         center = l2 * math.cos(forearm), l2 * math.sin(forearm)
-        for direction in _directions(center, l1, wrist, on_axis):
+        for direction in directions(center, l1, wrist, on_axis):
             yield direction, forearm - direction
-
-
-def _directions(
-    center: tuple[float, float], radius: float, wrist: tuple[float, float], on_axis: float
-) -> Iterator[float]:
-    """Yield the direction from `center` to the target wrist, and those with the tool on axis 1."""
-    yield math.atan2(wrist[1] - center[1], wrist[0] - center[0])
-    along = on_axis - center[0]
-    if abs(along) <= radius:
-        across = math.sqrt((radius - along) * (radius + along))
-        yield math.atan2(across, along)
-        yield math.atan2(-across, along)
 
 
 def _corners(planar: PlanarArm, phi: float) -> Iterator[_Angles]:

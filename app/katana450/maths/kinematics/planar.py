@@ -107,6 +107,18 @@ def _meeting(
     )
 
 
+def directions(
+    center: tuple[float, float], radius: float, target: tuple[float, float], axis: float | None
+) -> Iterator[float]:
+    """Yield the direction from `center` to the target, and those to the points with u = `axis`."""
+    yield math.atan2(target[1] - center[1], target[0] - center[0])
+    out = math.inf if axis is None else axis - center[0]
+    if abs(out) <= radius:
+        across = math.sqrt((radius - out) * (radius + out))
+        yield math.atan2(across, out)
+        yield math.atan2(-across, out)
+
+
 @dataclass(frozen=True, slots=True)
 class PlanarArm:
     """A planar 3R arm on one branch.
@@ -210,12 +222,13 @@ class PlanarArm:
 
     def _stationary(self, u: float, v: float, *, on_axis: bool) -> Iterator[Posture]:
         """Yield the postures that meet the Karush-Kuhn-Tucker conditions for (u, v)."""
+        target, axis = (u, v), self.axis if on_axis else None
         for theta3, theta4, stretched in self._shapes_beyond_shoulder():
             if self.theta3.fit(theta3) is None or self.theta4.fit(theta4) is None:
                 continue
             forearm = _joined(self.l2, self.l3, theta4)
             arm = _joined(self.l1, forearm.length, theta3 + forearm.bearing)
-            for direction in self._directions((0.0, 0.0), arm.length, u, v, on_axis):
+            for direction in directions((0.0, 0.0), arm.length, target, axis):
                 yield from self._if_fits(direction - arm.bearing, theta3, theta4, stretched)
         for theta2 in self.theta2.ends:
             elbow = self.l1 * math.cos(theta2), self.l1 * math.sin(theta2)
@@ -223,14 +236,14 @@ class PlanarArm:
                 if self.theta4.fit(theta4) is None:
                     continue
                 shape = _joined(self.l2, self.l3, theta4)
-                for direction in self._directions(elbow, shape.length, u, v, on_axis):
+                for direction in directions(elbow, shape.length, target, axis):
                     theta3 = direction - shape.bearing - theta2
                     yield from self._if_fits(theta2, theta3, theta4, stretched)
             for theta3 in self.theta3.ends:
                 b = theta2 + theta3
                 wrist = elbow[0] + self.l2 * math.cos(b), elbow[1] + self.l2 * math.sin(b)
                 singular = self._singular(theta3)
-                for direction in self._directions(wrist, self.l3, u, v, on_axis):
+                for direction in directions(wrist, self.l3, target, axis):
                     yield from self._if_fits(theta2, theta3, direction - b, singular)
                 for theta4 in self.theta4.ends:
                     yield from self._if_fits(theta2, theta3, theta4, singular)
@@ -254,17 +267,6 @@ class PlanarArm:
             yield theta4, False
         yield 0.0, True
         yield math.pi, True
-
-    def _directions(
-        self, center: tuple[float, float], radius: float, u: float, v: float, on_axis: bool
-    ) -> tuple[float, ...]:
-        """Return the direction from `center` to (u, v), and with `on_axis` those to axis 1."""
-        towards = math.atan2(v - center[1], u - center[0])
-        out = self.axis - center[0]
-        if not on_axis or abs(out) > radius:
-            return (towards,)
-        across = math.sqrt((radius - out) * (radius + out))
-        return towards, math.atan2(across, out), math.atan2(-across, out)
 
     def _singular(self, theta3: float) -> bool:
         return abs(math.remainder(theta3, math.pi)) <= tolerances.ROUNDING

@@ -88,10 +88,9 @@ class Tracked:
     def leap_ahead(self) -> tuple[int, float]:
         """Return the axis (from 0) that would leap farthest to the pose beyond the gap.
 
-        Also returns the angle of the leap [rad]. Without a gap the result is (0, 0.0).
+        Also returns the angle of the leap [rad].
         """
-        if self.beyond_gap is None:
-            return 0, 0.0
+        assert self.beyond_gap is not None
         turns = np.abs(self.beyond_gap.q - self.best.q)
         return int(turns.argmax()), float(turns.max())
 
