@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -144,6 +144,8 @@ class OffsetWrist(Kinematics):
 
     links: DHLinks
 
+    are_separate: ClassVar[bool] = False
+
     @staticmethod
     def of(chain: Chain, links: DHLinks) -> OffsetWrist | str:
         """Return the kinematics of `chain`, or the condition that it misses."""
@@ -158,11 +160,6 @@ class OffsetWrist(Kinematics):
     def method(self) -> str:
         """The method in words."""
         return f"elimination for six axes with an offset wrist, by axis {self.locked + 1}"
-
-    @property
-    def are_separate(self) -> bool:
-        """False: see the class."""
-        return False
 
     @cached_property
     def branches(self) -> tuple[str, ...]:

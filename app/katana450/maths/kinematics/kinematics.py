@@ -42,14 +42,11 @@ class Kinematics(ABC):
     chain: Chain
 
     is_pitched: ClassVar[bool] = False
+    are_separate: ClassVar[bool] = True
 
     @property
     def is_exact(self) -> bool:  # noqa: D102
         return False
-
-    @property
-    def are_separate(self) -> bool:  # noqa: D102
-        return True
 
     @property
     def arm_angle_joint(self) -> int | None:  # noqa: D102
