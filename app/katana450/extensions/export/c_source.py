@@ -459,8 +459,8 @@ const robot_joint robot_joints[ROBOT_JOINTS + 1] = {{
 
 const double robot_start[ROBOT_JOINTS + 1] = {{{start + ", " if start else ""}0.0}};
 
-const double robot_eye[3] = {{{_triple(view.eye)}}};
-const double robot_target[3] = {{{_triple(view.target)}}};
+const double robot_eye[3] = {_list(view.eye)};
+const double robot_target[3] = {_list(view.target)};
 const double robot_field_of_view = {double(FIELD_OF_VIEW)};
 
 /* The function that draws each link; a null pointer for a link without shapes. */
@@ -494,7 +494,3 @@ def _float_rows(rows: FloatArray) -> Iterator[str]:
 
 def _single(value: float) -> str:
     return f"{round(float(value), 4)!r}f"
-
-
-def _triple(values: FloatArray) -> str:
-    return ", ".join(double(value) for value in values)

@@ -153,8 +153,7 @@ def home_of(robot: Robot) -> Mapping[str, float]:
     arm = robot.arm
     if arm is None:
         return robot.every({})
-    *q, gripper = home_vector(robot).tolist()
-    return robot.every(arm.joint_values(np.array(q), gripper))
+    return robot.every(arm.joint_values(arm.ready(Settings.ready), arm.gripper.clamp(0.0)))
 
 
 def home_vector(robot: Robot) -> FloatArray:

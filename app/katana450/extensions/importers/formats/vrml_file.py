@@ -81,12 +81,12 @@ def indices(node: Node, field: str) -> IntArray:
     return numbers.astype(np.int64)
 
 
-def flag(node: Node, field: str, default: bool = True) -> bool:
-    """Return a Boolean field. Raises FieldError."""
+def flag(node: Node, field: str) -> bool:
+    """Return a Boolean field, which is TRUE by default. Raises FieldError."""
     value = node.get(field)
     if not isinstance(value, bool | None):
         raise FieldError(f"{node.kind}.{field} must be TRUE or FALSE")
-    return default if value is None else value
+    return value is not False
 
 
 def part(node: Node, field: str) -> Node | None:
