@@ -25,8 +25,8 @@ from benchmarks.lerobot_environment import environment_of, prepare_lerobot
 from katana450.arm.robot.props import load_props
 from katana450.cli.main import main as katana450
 from katana450.extensions.media.stage import RenderStage, Shot
-from katana450.extensions.recording.files.table import RecordedStates
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.table import RecordedStates
 from katana450.server.viser_bridge.presets import Preset
 from tests.recording.dataset_files import BEGIN, episode_folder
 from tests.recording.lerobot_check import check_dataset, episodes_of, rows_of
