@@ -269,5 +269,7 @@ def test_invalid_vias_are_refused(arm: ArmModel, ready: FloatArray) -> None:
     ):
         with pytest.raises(InputError):
             JointPath(arm.chain, vias, blend)
-    with pytest.raises(InputError, match=r"Via 2 has axis 2 at 57.3 deg, 49.55 deg beyond"):
+    with pytest.raises(
+        InputError, match=r"Place 2 of the path has axis 2 at 57.3 deg, 49.55 deg beyond"
+    ):
         JointPath(arm.chain, np.array([ready, [0.0, 1.0, 0.0, 0.0, 0.0]]))

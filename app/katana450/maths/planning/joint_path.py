@@ -70,7 +70,8 @@ class JointPath(PolynomialPath):
                 beyond = np.maximum(self.chain.lower - q, q - self.chain.upper)
                 axis = int(beyond.argmax())
                 raise InputError(
-                    f"Via {number + 1} has axis {axis + 1} at {math.degrees(q[axis]):.1f} deg, "
+                    f"Place {number + 1} of the path has axis {axis + 1} at "
+                    f"{math.degrees(q[axis]):.1f} deg, "
                     f"{math.degrees(beyond[axis]):.4g} deg beyond its limit."
                 )
         # A leg is as long as its duration at full speed, so that no leg has length 0.
