@@ -86,6 +86,8 @@ class Traits:
     def __post_init__(self) -> None:
         if self.passive and self.supersedes:
             raise ValueError("A command that supersedes a motion cannot be passive to planning.")
+        if self.planned and self.joints_only:
+            raise ValueError("A path is planned only for an arm with a tool.")
 
 
 class Act(
