@@ -110,6 +110,18 @@ def test_other_branch_is_reached_on_a_clear_path(program: Client) -> None:
     assert back.branch == ("front", "up")
 
 
+def test_state_after_a_failed_planning_gives_the_reason(program: Client) -> None:
+    start = program.joints(np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)))
+    T = np.eye(4)
+    # It meets the arm in its goal, so that no long search for a path is waited for.
+    T[:3, 3] = (0.2, 0.0, 0.32)
+    program.ask(requests.Place(name="shelf", T=T, shape=requests.Shape.BOX, size=[0.3, 0.3, 0.1]))
+    state = program.branch("back-up")
+    assert "shelf" in state.why
+    assert state.q == start.q
+    assert program.joints(np.array(start.q)).why == ""
+
+
 def test_objects_are_moved_touched_and_removed(program: Client) -> None:
     known = {item.name: item for item in program.query(answers.Objects).objects}
     assert set(known) == {"cup", "basin"}

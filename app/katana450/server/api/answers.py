@@ -268,7 +268,8 @@ class State(Answer, frozen=True, kw_only=True):
         priority: Part of a target that is kept when the arm cannot satisfy all of it.
         status: ok, limited, paused, blocked, gap, stopped or fault.
         moving: Whether the arm moves, or plans a path that it will follow.
-        why: Reason for the status in words; empty without one.
+        why: Reason for the status in words, and until the next command the reason for which no
+            path was found; empty without one.
         findings: Reasons for which the goal is not the target, or is not approached.
         speed: Fraction of full speed.
         holder: Name of the holder of the lease; null while the lease is free.

@@ -101,10 +101,14 @@ def state(hub: Hub) -> answers.State:
     """Return the newest state. Raises LeaseError until there is an arm."""
     arm = hub.present()
     snapshot, holder, stopped = arm.snapshot, hub.lease.driver, hub.stopped
+    fields = once(snapshot, "state", lambda: _of_snapshot(arm, snapshot))
+    # A failed planning is read last: it is known before the arm is no longer busy.
+    moving = snapshot.state.moving or arm.busy
+    why = " ".join(filter(None, (arm.planning_failure, fields["why"])))
     return answers.State(
-        **once(snapshot, "state", lambda: _of_snapshot(arm, snapshot)),
+        **(fields | {"why": why}),
         sent=hub.clock(),
-        moving=snapshot.state.moving or arm.busy,
+        moving=moving,
         holder=None if holder is None else holder.name,
         stopped=None if stopped is None else stopped.why,
         stop=None if stopped is None else stopped.stage,
