@@ -74,8 +74,8 @@ a later question can come first. A command is answered with one of these:
 
 If a request is several commands (`set` with `more`) and some of them are refused, the outcome is
 `limited`, and the answer lists those parts with their reasons. Samples of a stream (`servo`, `jog`)
-are answered at once, as `accepted`. So are `branch`, whose path is planned first, and a `steer` that
-gives the arm no command yet. A `stop` is answered at once, as `requested`.
+are answered at once, as `accepted`. So are acts whose
+path is planned first ({planned}), and a `steer` that gives the arm no command yet. A `stop` is answered at once, as `requested`.
 
 A stop is cleared at the earliest when the arm is at rest, and 1 s after the newest STOP; until then
 `clear_stop` is refused with the reason. `clearable` in a state says when.
@@ -180,7 +180,9 @@ Without `wait` the answer comes at once. Then a moving arm stops, or pauses if i
 
 def page() -> str:
     """Return the text of the page."""
-    parts = [PREFACE.format(version=requests.VERSION)]
+    planned = sorted(tag_of(kind.__name__) for kind in requests.EVERY if kind.traits.planned)
+    names = ", ".join(f"`{name}`" for name in planned)
+    parts = [PREFACE.format(version=requests.VERSION, planned=names)]
     for title, listed, tag in (
         ("Requests", sorted(requests.CORE, key=lambda kind: kind.__name__), "do"),
         ("Answers", answers.EVERY, "is"),
