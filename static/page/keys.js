@@ -23,7 +23,7 @@ export function keyHandler(parts, stop) {
       if (!repeat) element("help-button", HTMLButtonElement).click();
       return true;
     }
-    return Boolean(parts.stage?.key(event)) || Jog.key(event) || Edit.key(event) || Boolean(parts.episodes?.key(event));
+    return Boolean(parts.stage?.handle.key(event)) || Jog.key(event) || Edit.key(event) || Boolean(parts.episodes?.key(event));
   }
 
   return (/** @type {KeyboardEvent} */ event) => {

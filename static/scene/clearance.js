@@ -29,9 +29,8 @@ export class Clearance {
     const { hasHidden, pixelOf } = sceneOf(this.#scene) ?? {};
     // Hidden nodes mean that the picture shows the past.
     const [from, to] = clearance && pixelOf && !hasHidden?.() ? clearance.points.map(pixelOf) : [];
-    const isShown = Boolean(from && to);
-    this.#picture.toggleAttribute("hidden", !isShown);
-    this.#label.hidden = !isShown;
+    this.#label.hidden = !from || !to;
+    this.#picture.toggleAttribute("hidden", this.#label.hidden);
     if (!clearance || !from || !to) return;
     cancelAnimationFrame(this.#frame);
     this.#frame = requestAnimationFrame(() => this.#draw());

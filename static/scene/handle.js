@@ -13,7 +13,7 @@ const MOVED = 1e-6; // m, below which a handle rests
 const STEPS = { move: 0.01, turn: 15 / DEGREES }; // m and rad, with Ctrl
 const FINE = 0.2; // fraction of the way of the pointer, with Shift
 const SOON = 5000; // ms after a drag in which a typed number belongs to it
-const FARTHEST = 1.5; // m, the largest coordinate that the server takes
+const FARTHEST = 1.5; // m; the server takes no larger coordinate
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)$/;
 
 /**
@@ -40,20 +40,11 @@ function put({ elements }, drag) {
   drag.drawn = elements.join();
 }
 
-/** Change the pose of a message in itself, because viser's page keeps the same arrays. @param {ViserPage.Message} message @param {Drag} drag @param {number} by */
-function change({ position = [], wxyz = [] }, { start, axis, turns }, by) {
-  if (axis === null || by === 0) return;
-  if (!turns) {
-    position.forEach((x, i) => (position[i] = x + by * start.elements[4 * axis + i]));
-    return;
-  }
-  const [cosine, sine] = [Math.cos(by / 2), Math.sin(by / 2)];
-  const [k, a, b] = [1 + axis, 1 + ((axis + 1) % 3), 1 + ((axis + 2) % 3)];
-  const q = [...wxyz];
-  wxyz[0] = q[0] * cosine - q[k] * sine;
-  wxyz[k] = q[k] * cosine + q[0] * sine;
-  wxyz[a] = q[a] * cosine + q[b] * sine;
-  wxyz[b] = q[b] * cosine - q[a] * sine;
+/** Give a message the pose of its node, in its own arrays, because viser's page keeps them too. @param {ViserPage.Message} message @param {Three.Object3D} node */
+function take({ position = [], wxyz = [] }, { matrix, quaternion }) {
+  const { w, x, y, z } = quaternion.clone().setFromRotationMatrix(matrix);
+  position.splice(0, 3, ...matrix.elements.slice(12, 15));
+  wxyz.splice(0, 4, w, x, y, z);
 }
 
 export class Handle {
@@ -67,11 +58,8 @@ export class Handle {
   /** @type {Drag | null} */
   #typed = null; // the one whose number is typed
   #sending = false;
-  /** @type {Page.Pixel} */
-  #pixel = [0, 0]; // of the pointer
-  #touch = false;
-  #snaps = false;
-  #fine = false;
+  /** @type {{ pixel: Page.Pixel, touch: boolean, snaps: boolean, fine: boolean }} */
+  #pointer = { pixel: [0, 0], touch: false, snaps: false, fine: false };
   // The state line and the panel say the same to screen readers.
   #label = html("p", { id: "handle-label", class: "scene-label", "aria-hidden": "true", hidden: "" });
   #what = html("label", { for: "handle-number" });
@@ -94,11 +82,9 @@ export class Handle {
 
   /** Note where the pointer is, before viser's page gets the event. @param {PointerEvent} event */
   note(event) {
-    if (!event.isPrimary) return;
-    this.#pixel = [event.clientX, event.clientY];
-    this.#touch = event.pointerType === "touch";
-    this.#snaps = event.ctrlKey || event.metaKey;
-    this.#fine = event.shiftKey;
+    const { clientX, clientY, ctrlKey, metaKey, shiftKey, pointerType, isPrimary } = event;
+    if (!isPrimary) return;
+    this.#pointer = { pixel: [clientX, clientY], touch: pointerType === "touch", snaps: ctrlKey || metaKey, fine: shiftKey };
     // viser's page would turn a ring by steps of its own.
     if (this.#drag) Object.defineProperty(event, "shiftKey", { value: false });
   }
@@ -114,13 +100,14 @@ export class Handle {
     const { node, phaseOf } = sceneIn(this.#scene);
     const { name = "" } = message;
     const phase = phaseOf(message);
-    const start = node(name)?.matrix.clone();
-    if (phase === "Start" && start) this.#drag = { name, start, axis: null, turns: false, raw: 0, value: 0, shown: 0, drawn: "", sent: {} };
+    const handle = node(name);
+    if (phase === "Start" && handle)
+      this.#drag = { name, start: handle.matrix.clone(), axis: null, turns: false, raw: 0, value: 0, shown: 0, drawn: "", sent: {} };
     this.#follow();
     const drag = this.#drag;
     if (!drag || !phase) return;
     drag.sent[phase] = message;
-    if (phase === "Update") change(message, drag, drag.shown - drag.raw);
+    if (phase === "Update" && handle && drag.shown !== drag.raw) take(message, handle);
     if (phase !== "End") return;
     [this.#drag, this.#last, this.#ended] = [null, drag, performance.now()];
     this.#draw();
@@ -151,7 +138,7 @@ export class Handle {
     this.#number.ariaInvalid = "false";
     this.#form.hidden = false;
     this.#draw();
-    placeBeside(this.#form, this.#scene, this.#pixel, this.#touch);
+    placeBeside(this.#form, this.#scene, this.#pointer.pixel, this.#pointer.touch);
     this.#number.focus();
     return true;
   }
@@ -160,17 +147,16 @@ export class Handle {
   #enter() {
     const [drag, text] = [this.#typed, this.#number.value.trim().replace(",", ".").replace("−", "-")];
     const { Start, Update, End } = drag?.sent ?? {};
-    if (!drag || drag.axis === null || !Update) return this.close();
-    const shown = Number(text) / (drag.turns ? DEGREES : 1000);
     const { drawing, node, send } = sceneIn(this.#scene);
-    const place = drag.start.elements.slice(12, 15).map((x, i) => x + shown * drag.start.elements[4 * (drag.axis ?? 0) + i]);
-    const isPossible = drag.turns ? Math.abs(shown) <= Math.PI : Math.max(...place.map(Math.abs)) <= FARTHEST;
+    const handle = drag && node(drag.name);
+    if (!drag || drag.axis === null || !Update || !handle) return this.close();
+    const shown = Number(text) / (drag.turns ? DEGREES : 1000);
+    const isPossible = Math.abs(shown) <= (drag.turns ? Math.PI : FARTHEST);
     this.#number.ariaInvalid = String(!NUMBER.test(text) || !isPossible);
     if (this.#number.ariaInvalid === "true") return;
-    change(Update, drag, shown - drag.shown);
     drag.value = drag.shown = shown;
-    const matrix = node(drag.name)?.matrix;
-    if (matrix) put(matrix, drag);
+    put(handle.matrix, drag);
+    take(Update, handle);
     drawing().requestRender();
     this.#sending = true;
     for (const message of drag === this.#drag ? [Update] : [Start, Update, End]) send(message);
@@ -200,8 +186,8 @@ export class Handle {
     if (drag.turns) by -= 2 * Math.PI * Math.round(by / (2 * Math.PI));
     const step = drag.turns ? STEPS.turn : STEPS.move;
     drag.raw += by;
-    drag.value += this.#fine ? FINE * by : by;
-    drag.shown = this.#snaps ? step * Math.round(drag.value / step) : drag.value;
+    drag.value += this.#pointer.fine ? FINE * by : by;
+    drag.shown = this.#pointer.snaps ? step * Math.round(drag.value / step) : drag.value;
     if (drag.shown !== drag.raw) put(now, drag);
     else drag.drawn = now.elements.join();
     this.#draw();
@@ -216,7 +202,7 @@ export class Handle {
     const number = signed(drag.shown * (drag.turns ? DEGREES : 1000));
     const plus = /^[1-9]|^0\.[1-9]/.test(number) ? "+" : "";
     write(this.#label, `${nameOf(drag, drag.axis)} ${plus}${number}${drag.turns ? "°" : " mm"}${near}`);
-    placeBeside(this.#label, this.#scene, this.#pixel, this.#touch);
+    placeBeside(this.#label, this.#scene, this.#pointer.pixel, this.#pointer.touch);
   }
 }
 

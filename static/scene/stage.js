@@ -20,7 +20,7 @@ export class Stage {
   #scene;
   #page;
   #joints;
-  #handle;
+  handle;
   #views;
   /** @type {Branches | null} */
   #branches = null; // only for an arm that has some
@@ -42,7 +42,7 @@ export class Stage {
     this.#page = page;
     styled("scene.css", import.meta.url);
     this.#joints = new Joints(stage, scene, page);
-    this.#handle = new Handle(stage, scene, page.store);
+    this.handle = new Handle(stage, scene, page.store);
     new Clearance(stage, scene, page.store);
     this.#load();
     this.#views = new Views(stage, scene);
@@ -50,7 +50,7 @@ export class Stage {
     Object.assign(window.katana ?? {}, {
       turned: () => this.#views.turned(),
       /** @param {ViserPage.Message} message */
-      dragged: (message) => this.#handle.hear(message),
+      dragged: (message) => this.handle.hear(message),
     });
     scene.addEventListener("load", () => this.#listen());
     // What is held at a stop, or when another person drives, moves nothing afterwards.
@@ -87,19 +87,14 @@ export class Stage {
   // Select nothing.
   clear() {
     this.#joints.select(null);
-    this.#handle.close();
+    this.handle.close();
     this.#selection?.clear();
-  }
-
-  /** Return whether the key was handled. @param {KeyboardEvent} event */
-  key(event) {
-    return this.#handle.key(event);
   }
 
   // Release what the pointer holds.
   drop() {
     this.#joints.drop();
-    this.#handle.drop();
+    this.handle.drop();
   }
 
   /** @param {Api.Refused} answer */
@@ -118,7 +113,7 @@ export class Stage {
     on("pointercancel", ({ pointerId }) => this.#joints.holds(pointerId) && this.#joints.lose());
     on("pointerout", ({ relatedTarget }) => relatedTarget || this.#hover(null));
     on("blur", this.#blur);
-    this.#handle.listen(inner);
+    this.handle.listen(inner);
     on("dblclick", this.#focus);
     this.#branches?.listen(inner);
   }
@@ -131,7 +126,7 @@ export class Stage {
   /** @param {PointerEvent} event */
   #down(event) {
     const { target, pointerId, pointerType, button, isPrimary } = event;
-    this.#handle.note(event);
+    this.handle.note(event);
     this.#press = null;
     if (button || !isPrimary || this.#joints.dragging || !matches(target, "canvas")) return;
     /** @type {Page.Pixel} */
@@ -150,7 +145,7 @@ export class Stage {
   #move(event) {
     /** @type {Page.Pixel} */
     const pixel = [event.clientX, event.clientY];
-    this.#handle.note(event);
+    this.handle.note(event);
     if (this.#joints.holds(event.pointerId)) {
       event.stopImmediatePropagation();
       this.#joints.move(pixel);

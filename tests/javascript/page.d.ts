@@ -87,7 +87,7 @@ declare namespace Three {
     project(camera: Camera): this; unproject(camera: Camera): this; toArray(): Page.Vector;
   }
   interface Vector2 { clone(): Vector2; set(x: number, y: number): this; }
-  interface Quaternion { clone(): Quaternion; multiply(q: Quaternion): this; setFromAxisAngle(axis: Vector3, angle: number): this; }
+  interface Quaternion { x: number; y: number; z: number; w: number; clone(): Quaternion; setFromRotationMatrix(m: Matrix4): this; multiply(q: Quaternion): this; setFromAxisAngle(axis: Vector3, angle: number): this; }
   interface Matrix4 { elements: number[]; clone(): Matrix4; invert(): this; multiply(m: Matrix4): this; copy(m: Matrix4): this; }
   interface Colour { set(colour: number | string): void; }
   interface Material { clone(): Material; dispose(): void; color: Colour; emissive?: Colour; emissiveIntensity: number; }
