@@ -189,5 +189,5 @@ enter().then((mayEnter) => {
   const { protocol, host } = location;
   send({ open: `${protocol.replace("http", "ws")}//${host}/control?page=${page.name}` });
   parts.begin();
-  sheets.begin();
+  sheets.begin(frame.rest);
 });

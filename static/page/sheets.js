@@ -5,6 +5,7 @@ import * as Objects from "../objects.js";
 
 const OPEN = "katana450.sheets.open"; // ids
 const SIDE = "katana450.sheets.side"; // left or right
+const WIDTH = "katana450.sheets.width"; // in CSS; empty for the first one
 const SHEETS = ["jog", "objects", "teach", "episodes"];
 // Where the sheets are beside the scene, they are open again at the next visit. On a phone they would hide most of it.
 const beside = matchMedia("(min-width: 561px) and (min-height: 501px)");
@@ -31,6 +32,7 @@ export class Sheets {
     const [dock, side] = [element("dock", HTMLElement), first("#side select", HTMLSelectElement)];
     side.value = dock.dataset.side = kept.getItem(SIDE) ?? "right";
     side.addEventListener("change", () => kept.setItem(SIDE, (dock.dataset.side = side.value)));
+    dock.style.setProperty("--width", kept.getItem(WIDTH));
     for (const id of SHEETS)
       buttonOf(id).addEventListener("click", async () => {
         this.#waiting.clear();
@@ -39,8 +41,9 @@ export class Sheets {
       });
   }
 
-  // Show what was open at the last visit, as soon as the server offers it.
-  begin() {
+  // Show what was open at the last visit, as soon as the server offers it. The edge of the dock waits for `rest`.
+  /** @param {Promise<void>} rest */
+  async begin(rest) {
     const open = this.#page.kept.getItem(OPEN)?.split(" ") ?? [];
     if (beside.matches) this.#waiting = new Set(SHEETS.filter((id) => open.includes(id)));
     const show = () => {
@@ -48,6 +51,9 @@ export class Sheets {
     };
     show();
     new MutationObserver(show).observe(first("nav", HTMLElement), { subtree: true, attributeFilter: ["hidden"] });
+    await rest;
+    const edge = await import("../dock/edge.js");
+    edge.begin(this.#page, WIDTH);
   }
 
   /** Show or hide a sheet. One that is shown closes those that have no room beside it. @param {string} id */
