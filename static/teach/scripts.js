@@ -6,14 +6,6 @@ import { messageOf, request } from "../server.js";
 const FILE = ".yaml";
 const NEW = ".new"; // value of the option; no script has such a name
 
-/**
- * What the sheet does with a script.
- * @typedef {object} Sheet
- * @property {() => { name: string, text: string }} script returns the one that is shown; throws an error without one
- * @property {(text: string, name: string) => Promise<void>} load @property {() => void} begin shows an empty list of poses
- * @property {(words: string, bad?: boolean) => void} report
- */
-
 export class Scripts {
   #sheet;
   open = html("select", { "aria-label": "Program" });
@@ -24,7 +16,7 @@ export class Scripts {
   examples = {}; // of steps, by their names
   controls = [button("Download", () => this.#download()), this.#keep, this.#file];
 
-  /** @param {Sheet} sheet */
+  /** @param {import("./teach.js").Teach} sheet */
   constructor(sheet) {
     this.#sheet = sheet;
     this.open.addEventListener("change", () => this.#choose());

@@ -14,21 +14,9 @@ const NEEDED = "Its list needs one step. Insert another one first, or change the
 /** @typedef {import("./blocks.js").Edit} Edit */
 /** @typedef {"up" | "down" | "copy" | "off" | "add" | "text" | "remove"} Name */
 /** @typedef {{ element: HTMLElement, pause: HTMLButtonElement, run: HTMLButtonElement, number: HTMLElement, name: HTMLButtonElement, note: HTMLElement, steps: number[] }} Row */
-/**
- * @typedef {object} Sheet
- * @property {() => string | null} text returns that of the script that is shown; null without one
- * @property {(text: string, words: string) => void} change takes an edited text
- * @property {() => string} begin returns the text before the first step of a new script
- * @property {(line: number) => void} jump shows a line of the text
- * @property {() => Record<string, string>} examples returns a valid example of each step
- * @property {() => Promise<string>} pose returns the step that moves to the present pose
- * @property {(words: string, bad?: boolean) => void} report
- */
 
 export class Steps {
   #sheet;
-  #plan;
-  #editor;
   /** @type {Row[]} */
   #rows = [];
   /** @type {Block[]} */
@@ -43,11 +31,9 @@ export class Steps {
   #acts;
   element = html("div", {}, this.#list);
 
-  /** @param {Sheet} sheet @param {import("./plan.js").Plan} plan @param {import("./editor.js").Editor} editor */
-  constructor(sheet, plan, editor) {
+  /** @param {import("./teach.js").Teach} sheet */
+  constructor(sheet) {
     this.#sheet = sheet;
-    this.#plan = plan;
-    this.#editor = editor;
     /** @param {number} by */
     const move = (by) => (/** @type {string} */ text, /** @type {Block} */ own, /** @type {number} */ i) => {
       const { places, here } = placesOf(this.#blocks, i);
@@ -78,18 +64,18 @@ export class Steps {
   }
 
   get #isCurrent() {
-    return this.#editor.reading?.text === this.#sheet.text();
+    return this.#sheet.editor.reading?.text === this.#sheet.shownText;
   }
 
   /** Read the blocks of the script that is shown; return whether there are some. */
   async #fresh() {
-    const text = this.#sheet.text();
+    const text = this.#sheet.shownText;
     if (text !== null && !this.#isCurrent) {
-      const reading = await this.#editor.check((this.#asked = text));
+      const reading = await this.#sheet.editor.check((this.#asked = text));
       if (!reading) this.#sheet.report("The server does not answer.", true);
     }
     this.draw();
-    return this.#isCurrent && this.#editor.reading?.blocks !== null;
+    return this.#isCurrent && this.#sheet.editor.reading?.blocks !== null;
   }
 
   // Edit the block that is open. A second press may come before the server has read the text of the first.
@@ -102,7 +88,7 @@ export class Steps {
   async #editOne(name, act) {
     if (!(await this.#fresh())) return;
     const i = indexAt(this.#blocks, this.#line);
-    const text = this.#sheet.text();
+    const text = this.#sheet.shownText;
     const control = this.#buttons[name];
     if (i < 0 || text === null || control.ariaDisabled === "true") return;
     const edit = act(text, this.#blocks[i], i);
@@ -113,13 +99,14 @@ export class Steps {
   #take({ text, line }, words) {
     this.#line = line;
     this.#open(false);
-    this.#sheet.change(text, words);
+    this.#sheet.content.change({ text });
+    this.#sheet.report(words);
   }
 
   /** @param {string} step */
   async #insert(step) {
     const own = (await this.#fresh()) ? this.#blocks[indexAt(this.#blocks, this.#line)] : null;
-    const edit = inserted(this.#sheet.text() ?? this.#sheet.begin(), own ?? null, step);
+    const edit = inserted(this.#sheet.shownText ?? this.#sheet.emptyText, own ?? null, step);
     this.#take(edit, `Insert: ${step.split("\n")[0]}.`);
     this.#buttons.add.focus();
   }
@@ -128,7 +115,7 @@ export class Steps {
   #open(on) {
     this.#menu.hidden = !on;
     set(this.#buttons.add, "aria-expanded", on);
-    const examples = Object.entries(this.#sheet.examples());
+    const examples = Object.entries(this.#sheet.scripts.examples);
     if (!on || this.#menu.childElementCount || !examples.length) return;
     const pose = button("present pose", async () => this.#insert(await this.#sheet.pose()), { title: "joints: the angles of the present goal" });
     const others = examples.map(([word, step]) => button(word.replaceAll("_", " "), () => this.#insert(step), { title: step }));
@@ -136,8 +123,8 @@ export class Steps {
   }
 
   draw() {
-    const text = this.#sheet.text();
-    const { reading } = this.#editor;
+    const text = this.#sheet.shownText;
+    const { reading } = this.#sheet.editor;
     if (text !== null && !this.#isCurrent && this.#asked !== text) this.#fresh();
     if (text === null) this.#blocks = [];
     else if (this.#isCurrent && reading?.blocks) this.#blocks = reading.blocks;
@@ -148,12 +135,12 @@ export class Steps {
     set(this.#list, "aria-label", isLost ? "Steps before the mistake in the text" : "Steps");
     /** @type {Map<string, number[]>} */
     const numbers = new Map();
-    this.#plan.steps.forEach(({ line, column }, i) => {
+    this.#sheet.plan.steps.forEach(({ line, column }, i) => {
       const place = `${line}:${column}`;
       numbers.set(place, [...(numbers.get(place) ?? []), i + 1]);
     });
     this.#list.classList.toggle("planned", numbers.size > 0);
-    const wrong = new Set(this.#editor.problems.map(({ line }) => indexAt(this.#blocks, line)));
+    const wrong = new Set(this.#sheet.editor.problems.map(({ line }) => indexAt(this.#blocks, line)));
     while (this.#rows.length > this.#blocks.length) this.#rows.pop()?.element.remove();
     while (this.#rows.length < this.#blocks.length) this.#list.append(this.#add(this.#rows.length).element);
     this.#blocks.forEach((block, i) => this.#show(i, block, numbers.get(`${block.line}:${block.column}`) ?? [], wrong.has(i)));
@@ -206,8 +193,8 @@ export class Steps {
 
   /** @param {number} i @returns {Row} */
   #add(i) {
-    const pause = button("", () => this.#plan.toggle(this.#rows[i].steps), { class: "pause", title: "Pause before this step" });
-    const run = button("▶", () => this.#plan.runFrom(this.#rows[i].steps[0]), { title: "Run from this step" });
+    const pause = button("", () => this.#sheet.plan.toggle(this.#rows[i].steps), { class: "pause", title: "Pause before this step" });
+    const run = button("▶", () => this.#sheet.plan.runFrom(this.#rows[i].steps[0]), { title: "Run from this step" });
     const [number, note] = [html("b", { title: "Drag to another place" }), html("span")];
     const name = button("", () => this.select(name.ariaExpanded === "true" ? 0 : this.#blocks[i].line), { class: "name" });
     const element = html("li", {}, pause, run, number, name, note);
@@ -223,7 +210,7 @@ export class Steps {
 
   /** @param {number} from @param {number} over @param {boolean} after */
   #drop(from, over, after) {
-    const [own, text] = [this.#blocks[from], this.#sheet.text()];
+    const [own, text] = [this.#blocks[from], this.#sheet.shownText];
     if (text === null || !this.#isCurrent || own.indent === null) return;
     if (isOnly(this.#blocks, from)) return this.#sheet.report(NEEDED, true);
     const place = placeBeside(this.#blocks, from, over, after);
@@ -234,7 +221,7 @@ export class Steps {
   #show(i, { title, depth, enabled, indent }, numbers, isWrong) {
     const row = this.#rows[i];
     const { element, pause, run, number, name, note } = row;
-    const planned = numbers.map((step) => this.#plan.steps[step - 1]);
+    const planned = numbers.map((step) => this.#sheet.plan.steps[step - 1]);
     const round = planned.findIndex(({ mark }) => CURRENT.includes(mark));
     const isAlike = planned.every(({ mark }) => mark === planned[0].mark);
     const mark = planned[round]?.mark ?? planned.find((step) => step.mark === "next")?.mark ?? (isAlike ? planned[0]?.mark : "");
@@ -248,7 +235,7 @@ export class Steps {
     element.style.setProperty("--depth", String(Math.min(depth, 6)));
     const isOne = numbers.length === 1;
     set(pause, "aria-label", isOne ? `Pause before step ${numbers[0]}` : `Pause each time before: ${title}`);
-    set(pause, "aria-pressed", numbers.length > 0 && numbers.every((step) => this.#plan.breakpoints.includes(step)));
+    set(pause, "aria-pressed", numbers.length > 0 && numbers.every((step) => this.#sheet.plan.breakpoints.includes(step)));
     set(run, "aria-label", isOne ? `Run from step ${numbers[0]}` : `Run from: ${title}`);
     pause.hidden = run.hidden = !numbers.length;
     number.draggable = indent !== null;

@@ -32,18 +32,10 @@ export class Teach {
   #arm;
   /** @type {Map<string, Row>} */
   #rows = new Map(); // by the ids of the poses
-  #content;
+  content;
   #player;
-  #scripts = new Scripts({
-    script: () => this.#script(),
-    load: (text, name) => this.#load(text, name),
-    begin: () => {
-      this.#view = "poses";
-      this.#content.change({ name: "My script", times: 1, poses: [], text: null });
-    },
-    report: (words, bad) => this.#report(words, bad),
-  });
-  #editor = new Editor((text) => this.#content.keepText(text), (line) => this.#jump(line));
+  scripts = new Scripts(this);
+  editor = new Editor((text) => this.content.keepText(text), (line) => this.jump(line));
   /** @type {string | null} */
   #current = null; // id of the pose to which the arm moves
   #sheet = html("section", { id: "teach", class: "sheet", "aria-label": "Programs: record, preview and run", hidden: "" });
@@ -53,8 +45,8 @@ export class Teach {
   #add = button("Add pose", () => this.#record(), { class: "add" });
   #play = button("Run", () => this.#player.start("run"), { id: "teach-play", class: "main" });
   #step = button("Step", () => this.#player.start("step"), { id: "teach-step" });
-  #undo = button("↶", () => this.#content.undo(), { "aria-label": "Undo in Programs", title: "Undo in Programs" });
-  #redo = button("↷", () => this.#content.redo(), { "aria-label": "Redo in Programs", title: "Redo in Programs" });
+  #undo = button("↶", () => this.content.undo(), { "aria-label": "Undo in Programs", title: "Undo in Programs" });
+  #redo = button("↷", () => this.content.redo(), { "aria-label": "Redo in Programs", title: "Redo in Programs" });
   #times = html("input", { type: "number", min: "1", max: MAX_TIMES, step: "1", inputmode: "numeric" });
   #name = html("input", { maxlength: "40", spellcheck: "false", autocomplete: "off" });
   #views = {
@@ -64,8 +56,8 @@ export class Teach {
   };
   /** @type {View} */
   #view = "poses";
-  #plan;
-  #steps;
+  plan;
+  #steps = new Steps(this);
   #other = html("p", { id: "teach-other", hidden: "" });
 
   /** Return the sheet once it is styled and the arm is known. @param {Page.Context} page */
@@ -80,73 +72,53 @@ export class Teach {
   constructor(page, arm) {
     this.#page = page;
     this.#arm = arm;
-    this.#content = new Content(page.kept, arm, () => this.#draw());
-    this.#plan = new Plan(page.say, () => this.#shownText, () => this.#drawPlan());
-    /** @type {import("./steps.js").Sheet} */
-    const sheet = {
-      text: () => this.#shownText,
-      change: (text, words) => {
-        this.#content.change({ text });
-        this.#report(words);
-      },
-      begin: () => `name: ${JSON.stringify(this.#content.now.name)}\nsteps:\n`,
-      jump: (line) => this.#jump(line),
-      examples: () => this.#scripts.examples,
-      pose: async () => `joints: [${poseOf(await this.#state(), arm, "").joints.join(", ")}]`,
-      report: (words, bad) => this.#report(words, bad),
-    };
-    this.#steps = new Steps(sheet, this.#plan, this.#editor);
-    const display = {
-      report: (/** @type {string} */ words, bad = false) => this.#report(words, bad),
-      mark: (/** @type {string | null} */ pose) => this.#mark(pose),
-      script: () => this.#script(),
-      refuse: (/** @type {string} */ words) => this.#report(words, true),
-    };
-    this.#player = new Player(page, this.#content, this.#editor, display, this.#plan, ID);
+    this.content = new Content(page.kept, arm, () => this.#draw());
+    this.plan = new Plan(page.say, () => this.shownText, () => this.#drawPlan());
+    this.#player = new Player(page, this, ID);
     const preview = button("Preview", () => this.#player.start(null), { title: "Plan it: show the path of the tool, and times and breakpoints of the steps" });
     const actions = html("div", { class: "bar" }, this.#play, this.#step, preview, this.#undo, this.#redo);
     const views = html("div", { class: "bar views", role: "group", "aria-label": "Show as" }, ...Object.values(this.#views), this.#add);
     const loop = html("label", {}, "Loop", this.#times, "times");
     const named = html("label", { class: "wide" }, "Name", this.#name);
-    const files = html("div", { class: "bar" }, ...this.#scripts.controls);
+    const files = html("div", { class: "bar" }, ...this.scripts.controls);
     const rest = html("div", { class: "rest" }, html("div", { class: "bar" }, named, loop), files);
-    const scrolled = html("div", { class: "scrolled" }, this.#empty, this.#list, this.#steps.element, this.#editor.element);
-    this.#sheet.append(this.#scripts.open, actions, this.#says, this.#other, this.#plan.look, views, scrolled, this.#editor.list, rest);
+    const scrolled = html("div", { class: "scrolled" }, this.#empty, this.#list, this.#steps.element, this.editor.element);
+    this.#sheet.append(this.scripts.open, actions, this.#says, this.#other, this.plan.look, views, scrolled, this.editor.list, rest);
     element("dock", HTMLElement).prepend(this.#sheet);
     this.#times.addEventListener("change", () => {
       const times = Math.min(Math.max(Math.round(this.#times.valueAsNumber) || 1, 1), MAX_TIMES);
-      this.#content.change({ times });
+      this.content.change({ times });
     });
-    this.#name.addEventListener("change", () => this.#content.change({ name: this.#name.value.trim() || "My script" }));
+    this.#name.addEventListener("change", () => this.content.change({ name: this.#name.value.trim() || "My script" }));
     this.#sheet.addEventListener("keydown", (event) => this.#key(event));
-    if (this.#content.now.text !== null) [this.#editor.text, this.#view] = [this.#content.now.text, "steps"];
+    if (this.content.now.text !== null) [this.editor.text, this.#view] = [this.content.now.text, "steps"];
     this.#draw();
-    if (this.#content.broken) this.#report("What this browser had kept cannot be read, so the list is empty.");
+    if (this.content.broken) this.report("What this browser had kept cannot be read, so the list is empty.");
   }
 
   /** @param {boolean} shown */
   show(shown) {
     this.#sheet.hidden = !shown;
-    if (shown) this.#scripts.list();
-    this.#plan.watch(shown);
+    if (shown) this.scripts.list();
+    this.plan.watch(shown);
   }
 
   /** Take an answer; return whether it was for the sheet. @param {Page.Answer} answer */
   hear(answer) {
     if (answer.id !== `${ID} go`) return this.#player.hear(answer);
-    if (answer.is === "refused") this.#report(answer.why, true);
+    if (answer.is === "refused") this.report(answer.why, true);
     return true;
   }
 
   /** @param {string} words */
-  #report(words, bad = false) {
+  report(words, bad = false) {
     write(this.#says, words);
     this.#says.classList.toggle("bad", bad);
     this.#says.title = words;
   }
 
   get #poses() {
-    return this.#content.now.poses;
+    return this.content.now.poses;
   }
 
   /** Ctrl-Z and Ctrl-Y, except in a box, which has its own. @param {KeyboardEvent} event */
@@ -154,8 +126,8 @@ export class Teach {
     const key = event.key.toLowerCase();
     if (!(event.ctrlKey || event.metaKey) || !["z", "y"].includes(key) || matches(event.target, "input, textarea")) return;
     event.preventDefault();
-    if (key === "y" || event.shiftKey) this.#content.redo();
-    else this.#content.undo();
+    if (key === "y" || event.shiftKey) this.content.redo();
+    else this.content.undo();
   }
 
   // Poses
@@ -171,11 +143,11 @@ export class Teach {
       if (this.#poses.length >= MAX_POSES) throw new Error(`A script here has at most ${MAX_POSES} poses. Save it first.`);
       const state = await this.#state();
       const pose = poseOf(state, this.#arm, this.#picture());
-      this.#content.change({ poses: [...this.#poses, pose] });
+      this.content.change({ poses: [...this.#poses, pose] });
       this.#rows.get(pose.id)?.element.scrollIntoView({ block: "nearest" });
-      this.#report(`Pose ${this.#poses.length} is recorded.`);
+      this.report(`Pose ${this.#poses.length} is recorded.`);
     } catch (error) {
-      this.#report(messageOf(error), true);
+      this.report(messageOf(error), true);
     }
   }
 
@@ -200,9 +172,9 @@ export class Teach {
   #rowOf(pose) {
     /** @type {import("./row.js").Acts} */
     const acts = {
-      put: (id, fields) => this.#content.changePose(id, fields),
+      put: (id, fields) => this.content.changePose(id, fields),
       go: (id) => this.#go(id),
-      move: (id, by) => this.#move(id, this.#content.indexOf(id) + by),
+      move: (id, by) => this.#move(id, this.content.indexOf(id) + by),
       remove: (id) => this.#remove(id),
       toggleGrip: (id) => this.#toggleGrip(id),
     };
@@ -213,19 +185,19 @@ export class Teach {
 
   /** @param {string} id @param {number} to */
   #move(id, to) {
-    const from = this.#content.indexOf(id);
+    const from = this.content.indexOf(id);
     if (to === from || to < 0 || to >= this.#poses.length) return;
     const poses = [...this.#poses];
     poses.splice(to, 0, ...poses.splice(from, 1));
-    this.#content.change({ poses });
-    this.#report(`Pose ${from + 1} is now pose ${to + 1}.`);
+    this.content.change({ poses });
+    this.report(`Pose ${from + 1} is now pose ${to + 1}.`);
   }
 
   /** @param {string} id */
   #remove(id) {
-    const index = this.#content.indexOf(id);
-    this.#content.change({ poses: this.#poses.filter((pose) => pose.id !== id) });
-    this.#report(`Pose ${index + 1} is removed.`);
+    const index = this.content.indexOf(id);
+    this.content.change({ poses: this.#poses.filter((pose) => pose.id !== id) });
+    this.report(`Pose ${index + 1} is removed.`);
     // The focus stays in the list.
     const near = this.#rows.get(this.#poses[Math.min(index, this.#poses.length - 1)]?.id);
     const nextFocus = near ? first(".remove", HTMLElement, near.element) : this.#add;
@@ -234,25 +206,25 @@ export class Teach {
 
   /** A pose that was read from a script without a gripper takes the present place of the fingers. @param {string} id */
   async #toggleGrip(id) {
-    const pose = this.#poses[this.#content.indexOf(id)];
+    const pose = this.#poses[this.content.indexOf(id)];
     try {
       const gripper = pose.gripper ?? fingersOf(await this.#state(), this.#arm);
-      this.#content.changePose(id, { grips: !pose.grips, gripper });
+      this.content.changePose(id, { grips: !pose.grips, gripper });
     } catch (error) {
-      this.#report(messageOf(error), true);
+      this.report(messageOf(error), true);
     }
   }
 
   /** The arm moves there by a command, like from its sliders. @param {string} id */
   #go(id) {
-    const index = this.#content.indexOf(id);
+    const index = this.content.indexOf(id);
     const q = this.#poses[index].joints.map((angle) => angle * RADIANS);
-    this.#report(`To pose ${index + 1}.`);
+    this.report(`To pose ${index + 1}.`);
     this.#page.say({ do: "joints", q, revocations: this.#page.store.status?.revocations, id: `${ID} go` });
   }
 
-  /** @param {string | null} id */
-  #mark(id) {
+  /** Mark the pose to which the arm moves. @param {string | null} id */
+  mark(id) {
     if (id === this.#current) return;
     this.#current = id;
     this.#draw();
@@ -262,30 +234,30 @@ export class Teach {
   // Texts
 
   #toText() {
-    if (this.#content.now.text === null) {
-      this.#editor.text = scriptOf(this.#content.now).text;
-      this.#content.change({ text: this.#editor.text });
-      this.#report("Space types a blank in the text; Esc stops the arm.");
+    if (this.content.now.text === null) {
+      this.editor.text = scriptOf(this.content.now).text;
+      this.content.change({ text: this.editor.text });
+      this.report("Space types a blank in the text; Esc stops the arm.");
     }
     this.#see("text");
-    this.#editor.focus();
+    this.editor.focus();
   }
 
   // Show a line of the text; its block stays marked in the list of steps.
   /** @param {number} line */
-  #jump(line) {
+  jump(line) {
     this.#steps.select(line);
     this.#toText();
-    this.#editor.select(line);
+    this.editor.select(line);
   }
 
   async #toPoses() {
-    if (this.#content.now.text === null) return this.#see("poses");
-    const reading = await this.#editor.check();
-    if (!reading) return this.#report("There is no connection to the arm.", true);
+    if (this.content.now.text === null) return this.#see("poses");
+    const reading = await this.editor.check();
+    if (!reading) return this.report("There is no connection to the arm.", true);
     if (reading.taught) return this.#takeTaught(reading.taught);
     if (reading.problems.length) this.#see("text");
-    this.#report(reading.problems.length ? ERRORS : "It has steps that are no poses.", true);
+    this.report(reading.problems.length ? ERRORS : "It has steps that are no poses.", true);
   }
 
   /** @param {import("./poses.js").Taught} taught */
@@ -298,35 +270,51 @@ export class Teach {
       return old ? { ...pose, picture: old.picture, gripper: pose.gripper ?? old.gripper } : pose;
     });
     this.#view = "poses";
-    this.#content.change({ name, times: Math.min(times, MAX_TIMES), poses: taken, text: null });
-    this.#report(poses.length > MAX_POSES ? `Only the first ${MAX_POSES} poses are shown.` : "");
+    this.content.change({ name, times: Math.min(times, MAX_TIMES), poses: taken, text: null });
+    this.report(poses.length > MAX_POSES ? `Only the first ${MAX_POSES} poses are shown.` : "");
   }
 
-  // Return the name and the text of what the sheet shows.
-  #script() {
-    const { now } = this.#content;
-    if (now.text !== null) return { name: now.name, text: this.#editor.text };
+  // Return the name and the text of what the sheet shows. Throws an error if there is nothing.
+  script() {
+    const { now } = this.content;
+    if (now.text !== null) return { name: now.name, text: this.editor.text };
     if (!now.poses.length) throw new Error(EMPTY);
     return { name: now.name, text: scriptOf(now).text };
   }
 
   // The text of what the sheet shows; null without one.
-  get #shownText() {
-    const { now } = this.#content;
-    if (now.text !== null) return this.#editor.text;
+  get shownText() {
+    const { now } = this.content;
+    if (now.text !== null) return this.editor.text;
     return now.poses.length ? scriptOf(now).text : null;
+  }
+
+  // The text before the first step of a new script.
+  get emptyText() {
+    return `name: ${JSON.stringify(this.content.now.name)}\nsteps:\n`;
+  }
+
+  // Return the step that moves to the present pose.
+  async pose() {
+    return `joints: [${poseOf(await this.#state(), this.#arm, "").joints.join(", ")}]`;
+  }
+
+  // Show an empty list of poses.
+  begin() {
+    this.#view = "poses";
+    this.content.change({ name: "My script", times: 1, poses: [], text: null });
   }
 
   // Show a script: as poses if it has only these, otherwise its steps, or its text if this has errors.
   /** @param {string} text @param {string} name */
-  async #load(text, name) {
-    this.#editor.text = text;
+  async load(text, name) {
+    this.editor.text = text;
     this.#view = "steps";
-    this.#content.change({ text: this.#editor.text, name: name.slice(0, 40) });
-    const reading = await this.#editor.check();
-    if (reading?.taught) return this.#takeTaught({ ...reading.taught, name: this.#content.now.name });
+    this.content.change({ text: this.editor.text, name: name.slice(0, 40) });
+    const reading = await this.editor.check();
+    if (reading?.taught) return this.#takeTaught({ ...reading.taught, name: this.content.now.name });
     this.#see(reading?.problems.length && !reading.blocks ? "text" : "steps");
-    this.#report(reading?.problems.length ? ERRORS : `${name} is opened.`);
+    this.report(reading?.problems.length ? ERRORS : `${name} is opened.`);
   }
 
   // Display
@@ -341,44 +329,44 @@ export class Teach {
   #drawPlan() {
     const isSteps = this.#view === "steps";
     if (isSteps) this.#steps.draw();
-    this.#empty.hidden = isSteps ? this.#shownText !== null : this.#view === "text" || this.#poses.length > 0;
+    this.#empty.hidden = isSteps ? this.shownText !== null : this.#view === "text" || this.#poses.length > 0;
     write(this.#empty, isSteps ? NO_STEP : TEACH);
-    const { isShown, used, answer } = this.#plan;
+    const { isShown, used, answer } = this.plan;
     const isOther = used !== null && !isShown;
     if (isOther && this.#other.hidden) {
       const words = `${used.by} ${used.status === "planning" ? "plans" : "runs"} ${used.name || "a script"}. `;
-      this.#other.replaceChildren(words, button("Show it", () => this.#load(answer.text ?? "", used.name)));
+      this.#other.replaceChildren(words, button("Show it", () => this.load(answer.text ?? "", used.name)));
     }
     this.#other.hidden = !isOther;
   }
 
   #draw() {
-    const { name, times, poses, text } = this.#content.now;
+    const { name, times, poses, text } = this.content.now;
     // Undo and redo change which views there are.
     if (this.#view === (text === null ? "text" : "poses")) this.#view = text === null ? "poses" : "text";
     const focused = document.activeElement;
     this.#drawRows(poses);
     // A row that was moved in the document has lost the focus.
     if (focused instanceof HTMLElement && this.#list.contains(focused) && focused !== document.activeElement) focused.focus();
-    if (text !== null && text !== this.#editor.text) this.#editor.text = text;
+    if (text !== null && text !== this.editor.text) this.editor.text = text;
     const isText = text !== null;
     this.#sheet.classList.toggle("text", isText);
     this.#list.hidden = this.#view !== "poses";
     this.#steps.element.hidden = this.#view !== "steps";
-    this.#editor.list.hidden = this.#view === "poses";
-    this.#editor.element.hidden = this.#view !== "text";
+    this.editor.list.hidden = this.#view === "poses";
+    this.editor.element.hidden = this.#view !== "text";
     this.#add.hidden = this.#view !== "poses";
     // A pose may be several steps, and Go moves to one of them.
     this.#step.hidden = this.#view === "poses";
-    write(this.#scripts.shown, name);
-    this.#plan.draw();
+    write(this.scripts.shown, name);
+    this.plan.draw();
     this.#drawPlan();
     this.#times.disabled = isText;
     for (const [view, control] of Object.entries(this.#views)) set(control, "aria-pressed", view === this.#view);
     if (this.#times !== focused || this.#times.valueAsNumber !== times) this.#times.value = String(times);
     if (this.#name !== focused || this.#name.value.trim() !== name) this.#name.value = name;
-    set(this.#undo, "aria-disabled", !this.#content.undoable);
-    set(this.#redo, "aria-disabled", !this.#content.redoable);
+    set(this.#undo, "aria-disabled", !this.content.undoable);
+    set(this.#redo, "aria-disabled", !this.content.redoable);
   }
 
   /** @param {Pose[]} poses */
