@@ -62,3 +62,14 @@ export const matches = (target, selector) => Boolean(/** @type {Partial<Element>
 // Return the element round the target of an event that matches a selector; null without one.
 /** @param {EventTarget | null} target @param {string} selector */
 export const closest = (target, selector) => /** @type {Partial<Element> | null} */ (target)?.closest?.(selector) ?? null;
+
+/** Return a switch: while it is on, `act` is called at once and then each `every` ms. @param {() => void} act @param {number} every */
+export function repeating(act, every) {
+  let timer = 0;
+  return (/** @type {boolean} */ on) => {
+    clearInterval(timer);
+    if (!on) return;
+    timer = setInterval(act, every);
+    act();
+  };
+}

@@ -1,5 +1,5 @@
 // The chosen object in the sheet of objects: its looks, size and rotation, what carries it, and the rule for the arm in a zone.
-import { onClick, styled } from "../dom.js";
+import { onClick, repeating, styled } from "../dom.js";
 import { button, html, set } from "../instruments/shape.js";
 import { readObjects } from "../server.js";
 
@@ -33,7 +33,7 @@ export class ObjectForm {
   /** @type {Api.SceneObject[]} */
   #objects = [];
   #sender = 0;
-  #timer = 0;
+  watch = repeating(() => this.#read(), EVERY); // looks at the objects
   #acted = -Infinity; // ms, time of the last change
   #choice = html("select", { "aria-label": "Object" });
   #remove = button("Remove", () => this.#act({ do: "remove", name: this.#name }));
@@ -83,14 +83,6 @@ export class ObjectForm {
 
   get #object() {
     return this.#objects.find(({ name }) => name === this.#name);
-  }
-
-  /** Look at the objects from now on, or no longer. @param {boolean} on */
-  watch(on) {
-    clearInterval(this.#timer);
-    if (!on) return;
-    this.#timer = setInterval(() => this.#read(), EVERY);
-    this.#read();
   }
 
   // A control that changes the object when it is used.

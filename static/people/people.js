@@ -1,5 +1,5 @@
 // Who is connected, for admins: a list with buttons that disconnect.
-import { element, first, styled } from "../dom.js";
+import { element, first, repeating, styled } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 
 const EVERY = 1000; // ms between two queries while the list is open
@@ -29,7 +29,7 @@ export class People {
   /** The dialog is below the bar and not modal, so that mouse and finger can press STOP. @param {Page.Say} say */
   constructor(say) {
     this.say = say;
-    this.timer = 0;
+    this.watch = repeating(() => this.say({ do: "list_people" }), EVERY);
     this.drawn = "";
     styled("people.css", import.meta.url);
     this.dialog = html("dialog", { id: "people", "aria-labelledby": "people-title" });
@@ -38,25 +38,19 @@ export class People {
     this.list = element("people-list", HTMLElement);
     this.select = element("kick-for", HTMLSelectElement);
     this.dialog.addEventListener("close", () => {
-      clearInterval(this.timer);
+      this.watch(false);
       element("help-button", HTMLButtonElement).focus();
     });
     this.select.addEventListener("change", () => {
       this.drawn = "";
-      this.look();
+      this.watch(true);
     });
   }
 
   show() {
     this.drawn = "";
     this.dialog.show();
-    this.look();
-    clearInterval(this.timer);
-    this.timer = setInterval(() => this.look(), EVERY);
-  }
-
-  look() {
-    this.say({ do: "list_people" });
+    this.watch(true);
   }
 
   // The second click revokes a link, because nothing brings it back.
@@ -79,7 +73,7 @@ export class People {
     const act = () => {
       if (out === null) this.kick(member, made);
       else this.say({ do: "kick", person, seconds: 0 });
-      this.look();
+      this.watch(true);
     };
     // Its person stays the same while the label changes, so that the focus finds the button again.
     const made = button(label, act, { "aria-label": `${label} ${name}`, "data-person": person });

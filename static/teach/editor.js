@@ -4,7 +4,7 @@ import { button, html } from "../instruments/shape.js";
 /** @typedef {{ line: number, text: string }} Problem */
 /** @typedef {{ problems: Problem[], taught: import("./poses.js").Taught | null, blocks: import("./blocks.js").Block[] | null }} Reading */
 const AFTER = 400; // ms without typing after which the text is checked
-const PLACE = /^line (\d+), column \d+: (.*)$/;
+const PLACE = /^line (\d+), column \d+: (.*)$/gm;
 
 export class Editor {
   element = html("div", { id: "teach-editor" });
@@ -20,17 +20,15 @@ export class Editor {
   reading = null; // the last one, and the text that was read
   #timer = 0;
   #checked = 0;
+  #sheet;
 
-  #jump;
-
-  // `typed` is called with the text after each change, `jump` with the line of a problem that is pressed.
-  /** @param {(text: string) => void} typed @param {(line: number) => void} jump */
-  constructor(typed, jump) {
-    this.#jump = jump;
+  /** @param {import("./teach.js").Teach} sheet */
+  constructor(sheet) {
+    this.#sheet = sheet;
     this.element.append(html("div", {}, this.#numbers, this.#area));
     this.#area.addEventListener("input", () => {
       this.#count();
-      typed(this.text);
+      sheet.content.keepText(this.text);
       clearTimeout(this.#timer);
       this.#timer = setTimeout(() => this.check(), AFTER);
     });
@@ -73,7 +71,7 @@ export class Editor {
     [...this.#numbers.children].forEach((row, i) => row.classList.toggle("bad", lines.has(i + 1)));
     this.list.replaceChildren(
       ...problems.map(({ line, text }) =>
-        html("li", {}, button([html("b", {}, `Line ${line}`), ` ${text}`], () => this.#jump(line))),
+        html("li", {}, button([html("b", {}, `Line ${line}`), ` ${text}`], () => this.#sheet.jump(line))),
       ),
     );
   }
@@ -93,13 +91,7 @@ export class Editor {
   }
 }
 
-/** Return the problems that an error of a program names, with their lines. @param {string} why */
+/** Return the problems that an error of a program names, with their lines. @param {string} why @returns {Problem[]} */
 export function problemsOf(why) {
-  /** @type {Problem[]} */
-  const problems = [];
-  for (const row of why.split("\n")) {
-    const place = PLACE.exec(row);
-    if (place) problems.push({ line: Number(place[1]), text: place[2] });
-  }
-  return problems;
+  return [...why.matchAll(PLACE)].map(([, line, text]) => ({ line: Number(line), text }));
 }

@@ -1,5 +1,5 @@
 // The program that the server has: its steps, and the time of its preview that the scene shows.
-import { write } from "../dom.js";
+import { repeating, write } from "../dom.js";
 import { html, set } from "../instruments/shape.js";
 import { request } from "../server.js";
 
@@ -10,23 +10,20 @@ const IN_USE = ["planning", "running", "paused", "blocked"];
 
 export class Plan {
   #say;
-  #script;
-  #changed;
+  #sheet;
   /** @type {Api.ProgramPlan} */
   answer = { is: "program_plan" }; // of the server
-  #timer = 0;
   #sender = 0;
+  watch = repeating(() => this.read(), EVERY); // looks at the program of the server
   #pressed = -Infinity; // ms, time of the last use of the slider
   #slider = html("input", { type: "range", min: 0, max: 1, step: 0.1, value: 0, "aria-label": "Look at the time of the preview" });
   #time = html("output");
   look = html("label", { id: "teach-look", title: "Shows arm, objects and water at this time, before the program runs" }, "Look at", this.#slider, this.#time);
 
-  // script: returns the text of what the sheet shows, or null; `changed` is called after each look.
-  /** @param {Page.Say} say @param {() => string | null} script @param {() => void} changed */
-  constructor(say, script, changed) {
+  /** @param {Page.Say} say @param {import("./teach.js").Teach} sheet */
+  constructor(say, sheet) {
     this.#say = say;
-    this.#script = script;
-    this.#changed = changed;
+    this.#sheet = sheet;
     this.#slider.addEventListener("input", () => {
       this.#pressed = performance.now();
       this.#tell(this.#slider.valueAsNumber, this.answer.seconds ?? 0);
@@ -40,7 +37,7 @@ export class Plan {
 
   // Whether the server has the program that is shown.
   get isShown() {
-    return Boolean(this.answer.text) && this.answer.text === this.#script();
+    return Boolean(this.answer.text) && this.answer.text === this.#sheet.shownText;
   }
 
   // The program that is planned or runs; null without one.
@@ -59,20 +56,12 @@ export class Plan {
     return this.answer.program?.breakpoints ?? [];
   }
 
-  /** Look at the program of the server from now on, or no longer. @param {boolean} on */
-  watch(on) {
-    clearInterval(this.#timer);
-    if (!on) return;
-    this.#timer = setInterval(() => this.read(), EVERY);
-    this.read();
-  }
-
   async read() {
     const answer = await request("api/v1/program_plan").catch(() => null);
     if (!answer) return;
     this.answer = await answer.json();
     this.draw();
-    this.#changed();
+    this.#sheet.drawPlan();
   }
 
   draw() {

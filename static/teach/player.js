@@ -1,5 +1,4 @@
 // Planning and running what the sheet shows.
-import { messageOf } from "../server.js";
 import { problemsOf } from "./editor.js";
 import { scriptOf } from "./poses.js";
 import { ScriptRun } from "./run.js";
@@ -9,19 +8,14 @@ const PLANNING = "planning";
 export class Player {
   #page;
   #sheet;
-  #run;
+  run;
   #planning = Promise.resolve(); // the last preview
 
   /** @param {Page.Context} page @param {import("./teach.js").Teach} sheet @param {string} id of the requests */
   constructor(page, sheet, id) {
     this.#page = page;
     this.#sheet = sheet;
-    this.#run = new ScriptRun(page.say, id);
-  }
-
-  /** Take an answer; return whether it was for what plays. @param {Page.Answer} answer */
-  hear(answer) {
-    return this.#run.hear(answer);
+    this.run = new ScriptRun(page.say, id);
   }
 
   // Give the program that is shown the order `run` or `step`; null only plans it, so that the scene shows its path. The
@@ -30,19 +24,16 @@ export class Player {
   async start(order) {
     const { plan } = this.#sheet;
     const { revocations } = this.#page.store.status ?? {};
-    try {
-      if (order && plan.isShown && plan.used) return await this.#run.steer(order, revocations);
+    await this.#sheet.attempt(async () => {
+      if (order && plan.isShown && plan.used) return await this.run.steer(order, revocations);
       // Run soon after Preview: the plan is finished first, and kept.
       await this.#planning;
-      if (this.#run.busy) throw new Error("It is running. End it in the bar first.");
+      if (this.run.busy) throw new Error("It is running. End it in the bar first.");
       const playing = this.#play(order, revocations);
       if (!order) this.#planning = playing.catch(() => {});
       await playing;
-    } catch (error) {
-      this.#sheet.report(messageOf(error), true);
-    } finally {
-      this.#sheet.mark(null);
-    }
+    });
+    this.#sheet.mark(null);
   }
 
   /** @param {"run" | "step" | null} order @param {number | undefined} revocations */
@@ -55,7 +46,7 @@ export class Player {
     /** The index of the pose of a line; null for another line. @param {number} line */
     const poseAt = (line) => (isText ? null : scriptOf(now).poseAt(line));
     sheet.report("Planning …");
-    const program = await this.#run.play(text, order, revocations, ({ status, fraction, line, task }) => {
+    const program = await this.run.play(text, order, revocations, ({ status, fraction, line, task }) => {
       if (status === PLANNING) return sheet.report(`Planning ${Math.round(100 * fraction)} %`);
       const index = poseAt(line);
       if (index !== null) sheet.mark(now.poses[index].id);

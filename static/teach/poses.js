@@ -14,11 +14,7 @@ export const MAX_POSES = 100;
 export const MAX_TIMES = 100;
 export const MAX_WAIT = 3600; // s
 const MAX_VIAS = 50; // places of one step `via`
-const MAX_NAME = 40;
-const MAX_PICTURE = 12_000; // characters
-const MAX_TEXT = 65_536;
-const MAX_KEPT = 1_500_000; // characters of all poses: a browser keeps 5 million
-export const FORMAT = 1;
+const FORMAT = 1;
 
 // Return the pose for the joints and the fingers of a state; arm: the answer `arm`.
 /** @param {Api.State} state @param {Api.Arm} arm @param {string} picture */
@@ -93,36 +89,14 @@ export function scriptOf({ name, times, poses }) {
   return { text: `${lines.join("\n")}\n`, poseAt: (/** @type {number} */ line) => owners[line - 1] ?? null };
 }
 
-/** @param {number} value @param {number} low @param {number} high */
-const isNumber = (value, low, high) => Number.isFinite(value) && value >= low && value <= high;
-
-// Return the content that is kept as `json`, for an arm of so many joints. Throws an error if it is anything else.
+// Return the content that is kept as `json`. Throws an error if it is none, or of an arm with another number of joints.
 /** @param {string} json @param {number} joints @returns {Kept} */
 export function restored(json, joints) {
   /** @type {Kept & { format: number }} */
   const { format, name, times, poses, text } = JSON.parse(json);
-  /** @param {Pose} pose */
-  const good = (pose) =>
-    pose.joints.length === joints && pose.joints.every((angle) => isNumber(angle, -720, 720)) &&
-    (pose.gripper === null ? pose.grips === false : isNumber(pose.gripper, -180, 180) && typeof pose.grips === "boolean") &&
-    isNumber(pose.wait, 0, MAX_WAIT) && isNumber(pose.speed, 1, 100) && typeof pose.blend === "boolean" &&
-    typeof pose.picture === "string" && (!pose.picture || isPicture(pose.picture));
-  if (
-    format !== FORMAT || typeof name !== "string" || name.length > MAX_NAME || !Number.isInteger(times) ||
-    !isNumber(times, 1, MAX_TIMES) || poses.length > MAX_POSES || !poses.every(good) ||
-    !(text === null || (typeof text === "string" && text.length <= MAX_TEXT))
-  )
-    throw new Error("This is not what the page keeps.");
-  return { name, times, poses: poses.map((/** @type {Pose} */ pose) => made({ ...pose })), text };
+  if (format !== FORMAT || poses.some((pose) => pose.joints.length !== joints)) throw new Error("This is not what the page keeps.");
+  return { name, times, poses: poses.map((pose) => made(pose)), text };
 }
 
-/** Return `content` as a text to keep, without pictures if they take too much room. @param {Kept} content */
-export function kept({ name, times, poses, text }) {
-  /** @param {Pose[]} some */
-  const json = (some) => JSON.stringify({ format: FORMAT, name, times, poses: some, text });
-  const whole = json(poses);
-  return whole.length <= MAX_KEPT ? whole : json(poses.map((pose) => ({ ...pose, picture: "" })));
-}
-
-/** @param {string} url */
-export const isPicture = (url) => url.startsWith("data:image/") && url.length <= MAX_PICTURE;
+/** Return `content` as a text to keep. @param {Kept} content */
+export const kept = (content) => JSON.stringify({ format: FORMAT, ...content });

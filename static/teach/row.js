@@ -6,12 +6,6 @@ import { MAX_WAIT, restsBecause } from "./poses.js";
 /** @typedef {import("./poses.js").Pose} Pose */
 /** @typedef {"go" | "up" | "down" | "remove" | "grip" | "blend"} Name */
 /** @typedef {keyof typeof SHAPES} Shape */
-/**
- * @typedef {object} Acts
- * @property {(id: string, fields: Partial<Pose>) => void} put @property {(id: string) => void} go
- * @property {(id: string, by: number) => void} move @property {(id: string) => void} remove
- * @property {(id: string) => void} toggleGrip
- */
 const SHAPES = {
   go: "M3 10h12M10 4.5 15.5 10 10 15.5",
   up: "M10 16V4M4.5 9.5 10 4l5.5 5.5",
@@ -55,33 +49,27 @@ export class Row {
   /** @type {Pose | null} */
   #pose = null;
 
-  // acts: {put(id, fields), go(id), move(id, by), remove(id), toggleGrip(id)}; fingers: whether there are any.
-  /** @param {string} id @param {Acts} acts @param {boolean} fingers */
-  constructor(id, acts, fingers) {
+  /** `fingers`: whether there are any. @param {string} id @param {import("./teach.js").Teach} sheet @param {boolean} fingers */
+  constructor(id, sheet, fingers) {
     this.element.dataset.id = id;
     /** @param {"speed" | "wait"} name */
-    const put = (name) => (/** @type {number | null} */ value) => acts.put(id, { [name]: value ?? this.#pose?.[name] });
+    const put = (name) => (/** @type {number | null} */ value) => sheet.content.changePose(id, { [name]: value ?? this.#pose?.[name] });
     const speed = number("Speed", "%", 1, 100, 5, put("speed"));
     const wait = number("Wait", "s", 0, MAX_WAIT, 0.5, put("wait"));
     [this.#speed, this.#wait] = [speed.input, wait.input];
     /** @type {Record<Name, HTMLButtonElement>} */
     this.#buttons = {
-      grip: drawn("grip", () => acts.toggleGrip(id)),
-      blend: drawn("blend", () => !this.#isOff("blend") && acts.put(id, { blend: !this.#pose?.blend })),
-      go: drawn("go", () => acts.go(id), html("span", {}, "Go")),
-      up: drawn("up", () => !this.#isOff("up") && acts.move(id, -1)),
-      down: drawn("down", () => !this.#isOff("down") && acts.move(id, 1)),
-      remove: drawn("remove", () => acts.remove(id)),
+      grip: drawn("grip", () => sheet.toggleGrip(id)),
+      blend: drawn("blend", () => this.#buttons.blend.ariaDisabled === "false" && sheet.content.changePose(id, { blend: !this.#pose?.blend })),
+      go: drawn("go", () => sheet.go(id), html("span", {}, "Go")),
+      up: drawn("up", () => sheet.move(id, sheet.content.indexOf(id) - 1)),
+      down: drawn("down", () => sheet.move(id, sheet.content.indexOf(id) + 1)),
+      remove: drawn("remove", () => sheet.remove(id)),
     };
     if (!fingers) this.#buttons.grip.hidden = true;
     this.handle.append(this.#picture, this.#number);
     const row = html("div", { class: "acts" }, ...Object.values(this.#buttons));
     this.element.append(this.handle, html("div", { class: "numbers" }, speed.label, wait.label), row);
-  }
-
-  /** @param {Name} name */
-  #isOff(name) {
-    return this.#buttons[name].getAttribute("aria-disabled") === "true";
   }
 
   /** Show the pose `i` of all; `current`: whether the arm moves to it. @param {Pose[]} poses @param {number} i @param {boolean} current */

@@ -1,7 +1,7 @@
 // Scripts in files: those of the server's folder, and those of the person.
 import { save } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
-import { messageOf, request } from "../server.js";
+import { request } from "../server.js";
 
 const FILE = ".yaml";
 const NEW = ".new"; // value of the option; no script has such a name
@@ -41,11 +41,7 @@ export class Scripts {
     this.open.value = "";
     if (name === FILE) return this.#file.click();
     if (name === NEW) return this.#sheet.begin();
-    try {
-      await this.#sheet.load(await (await request(`api/v1/scripts/${encodeURIComponent(name)}`)).text(), name);
-    } catch (error) {
-      this.#sheet.report(messageOf(error), true);
-    }
+    await this.#sheet.attempt(async () => this.#sheet.load(await (await request(`api/v1/scripts/${encodeURIComponent(name)}`)).text(), name));
   }
 
   async #take() {
@@ -54,28 +50,20 @@ export class Scripts {
     if (file) await this.#sheet.load(await file.text(), file.name.replace(/\.ya?ml$/i, ""));
   }
 
-  /** Use the script that is shown, and report what this returns or why it fails. @param {(name: string, text: string) => string | Promise<string>} use */
-  async #use(use) {
-    try {
-      const { name, text } = this.#sheet.script();
-      this.#sheet.report(await use(name, text));
-    } catch (error) {
-      this.#sheet.report(messageOf(error), true);
-    }
-  }
-
   #download() {
-    return this.#use((name, text) => {
+    return this.#sheet.attempt(() => {
+      const { name, text } = this.#sheet.script();
       save(new Blob([text], { type: "application/yaml" }), `${name}${FILE}`);
-      return `Saved as ${name}${FILE}.`;
+      this.#sheet.report(`Saved as ${name}${FILE}.`);
     });
   }
 
   #save() {
-    return this.#use(async (name, text) => {
+    return this.#sheet.attempt(async () => {
+      const { name, text } = this.#sheet.script();
       await request(`api/v1/scripts/${encodeURIComponent(name)}`, { method: "POST", body: text });
       await this.list();
-      return `Saved as ${name}. It is in the list of programs.`;
+      this.#sheet.report(`Saved as ${name}. It is in the list of programs.`);
     });
   }
 }

@@ -1,6 +1,6 @@
 // The sheet of programs: one program at a time, as poses that are recorded and ordered, as its steps, or as text. It is
 // previewed, run and saved.
-import { element, first, matches, sceneOf, styled, write } from "../dom.js";
+import { element, first, matches, styled, write } from "../dom.js";
 import { button, html, set } from "../instruments/shape.js";
 import { messageOf, readArm, readState } from "../server.js";
 import { thumbnail } from "../viser/pictures.js";
@@ -9,7 +9,7 @@ import { Editor } from "./editor.js";
 import { draggable } from "./order.js";
 import { Plan } from "./plan.js";
 import { Player } from "./player.js";
-import { MAX_POSES, MAX_TIMES, fingersOf, isPicture, poseOf, read, scriptOf } from "./poses.js";
+import { MAX_POSES, MAX_TIMES, fingersOf, poseOf, read, scriptOf } from "./poses.js";
 import { Row } from "./row.js";
 import { Scripts } from "./scripts.js";
 import { Steps } from "./steps.js";
@@ -17,8 +17,6 @@ import { Steps } from "./steps.js";
 /** @typedef {import("./poses.js").Pose} Pose */
 const ID = "teach"; // id of the requests
 const [WIDTH, HEIGHT] = [96, 72]; // px of a picture
-const FILLED = 1.35; // size of a picture, relative to the arm in it
-const AROUND = [[0, 0, 0], [0, 0, 0.5], "/target/move"]; // places round the arm
 const RADIANS = Math.PI / 180;
 const EMPTY = "There is no pose yet. Move the arm and add a pose.";
 const TEACH = "Move the arm, then press Add pose. Each pose keeps the joints and the gripper. Or choose a program above.";
@@ -35,7 +33,7 @@ export class Teach {
   content;
   #player;
   scripts = new Scripts(this);
-  editor = new Editor((text) => this.content.keepText(text), (line) => this.jump(line));
+  editor = new Editor(this);
   /** @type {string | null} */
   #current = null; // id of the pose to which the arm moves
   #sheet = html("section", { id: "teach", class: "sheet", "aria-label": "Programs: record, preview and run", hidden: "" });
@@ -73,7 +71,7 @@ export class Teach {
     this.#page = page;
     this.#arm = arm;
     this.content = new Content(page.kept, arm, () => this.#draw());
-    this.plan = new Plan(page.say, () => this.shownText, () => this.#drawPlan());
+    this.plan = new Plan(page.say, this);
     this.#player = new Player(page, this, ID);
     const preview = button("Preview", () => this.#player.start(null), { title: "Plan it: show the path of the tool, and times and breakpoints of the steps" });
     const actions = html("div", { class: "bar" }, this.#play, this.#step, preview, this.#undo, this.#redo);
@@ -105,7 +103,7 @@ export class Teach {
 
   /** Take an answer; return whether it was for the sheet. @param {Page.Answer} answer */
   hear(answer) {
-    if (answer.id !== `${ID} go`) return this.#player.hear(answer);
+    if (answer.id !== `${ID} go`) return this.#player.run.hear(answer);
     if (answer.is === "refused") this.report(answer.why, true);
     return true;
   }
@@ -115,6 +113,15 @@ export class Teach {
     write(this.#says, words);
     this.#says.classList.toggle("bad", bad);
     this.#says.title = words;
+  }
+
+  /** Report why an act fails. @param {() => unknown} act */
+  async attempt(act) {
+    try {
+      await act();
+    } catch (error) {
+      this.report(messageOf(error), true);
+    }
   }
 
   get #poses() {
@@ -138,53 +145,25 @@ export class Teach {
     return state;
   }
 
-  async #record() {
-    try {
+  #record() {
+    return this.attempt(async () => {
       if (this.#poses.length >= MAX_POSES) throw new Error(`A script here has at most ${MAX_POSES} poses. Save it first.`);
-      const state = await this.#state();
-      const pose = poseOf(state, this.#arm, this.#picture());
+      const pose = poseOf(await this.#state(), this.#arm, thumbnail(this.#page.scene, WIDTH, HEIGHT));
       this.content.change({ poses: [...this.#poses, pose] });
       this.#rows.get(pose.id)?.element.scrollIntoView({ block: "nearest" });
       this.report(`Pose ${this.#poses.length} is recorded.`);
-    } catch (error) {
-      this.report(messageOf(error), true);
-    }
-  }
-
-  // Return a small picture of the arm; empty if the scene is not drawn.
-  #picture() {
-    const { scene } = this.#page;
-    const pixels = AROUND.flatMap((place) => {
-      const pixel = sceneOf(scene)?.pixelOf(place);
-      return pixel ? [pixel] : [];
     });
-    if (pixels.length < 2) return "";
-    const [[left, right], [top, bottom]] = [0, 1].map((axis) => {
-      const all = pixels.map((pixel) => pixel[axis]);
-      return [Math.min(...all), Math.max(...all)];
-    });
-    const high = FILLED * Math.max(bottom - top, ((right - left) * HEIGHT) / WIDTH);
-    const picture = thumbnail(scene, (left + right) / 2, (top + bottom) / 2, high, WIDTH, HEIGHT);
-    return isPicture(picture) ? picture : "";
   }
 
   /** @param {Pose} pose */
   #rowOf(pose) {
-    /** @type {import("./row.js").Acts} */
-    const acts = {
-      put: (id, fields) => this.content.changePose(id, fields),
-      go: (id) => this.#go(id),
-      move: (id, by) => this.#move(id, this.content.indexOf(id) + by),
-      remove: (id) => this.#remove(id),
-      toggleGrip: (id) => this.#toggleGrip(id),
-    };
-    const row = new Row(pose.id, acts, Boolean(this.#arm.gripper));
-    draggable(row.element, row.handle, (element, to) => this.#move(element.dataset.id ?? "", to));
+    const row = new Row(pose.id, this, Boolean(this.#arm.gripper));
+    draggable(row.element, row.handle, (element, to) => this.move(element.dataset.id ?? "", to));
     return row;
   }
 
   /** @param {string} id @param {number} to */
-  #move(id, to) {
+  move(id, to) {
     const from = this.content.indexOf(id);
     if (to === from || to < 0 || to >= this.#poses.length) return;
     const poses = [...this.#poses];
@@ -194,7 +173,7 @@ export class Teach {
   }
 
   /** @param {string} id */
-  #remove(id) {
+  remove(id) {
     const index = this.content.indexOf(id);
     this.content.change({ poses: this.#poses.filter((pose) => pose.id !== id) });
     this.report(`Pose ${index + 1} is removed.`);
@@ -205,18 +184,16 @@ export class Teach {
   }
 
   /** A pose that was read from a script without a gripper takes the present place of the fingers. @param {string} id */
-  async #toggleGrip(id) {
+  toggleGrip(id) {
     const pose = this.#poses[this.content.indexOf(id)];
-    try {
+    return this.attempt(async () => {
       const gripper = pose.gripper ?? fingersOf(await this.#state(), this.#arm);
       this.content.changePose(id, { grips: !pose.grips, gripper });
-    } catch (error) {
-      this.report(messageOf(error), true);
-    }
+    });
   }
 
   /** The arm moves there by a command, like from its sliders. @param {string} id */
-  #go(id) {
+  go(id) {
     const index = this.content.indexOf(id);
     const q = this.#poses[index].joints.map((angle) => angle * RADIANS);
     this.report(`To pose ${index + 1}.`);
@@ -326,7 +303,7 @@ export class Teach {
   }
 
   // Show the steps of the program of the server, or that it has another one.
-  #drawPlan() {
+  drawPlan() {
     const isSteps = this.#view === "steps";
     if (isSteps) this.#steps.draw();
     this.#empty.hidden = isSteps ? this.shownText !== null : this.#view === "text" || this.#poses.length > 0;
@@ -360,7 +337,7 @@ export class Teach {
     this.#step.hidden = this.#view === "poses";
     write(this.scripts.shown, name);
     this.plan.draw();
-    this.#drawPlan();
+    this.drawPlan();
     this.#times.disabled = isText;
     for (const [view, control] of Object.entries(this.#views)) set(control, "aria-pressed", view === this.#view);
     if (this.#times !== focused || this.#times.valueAsNumber !== times) this.#times.value = String(times);

@@ -12,7 +12,7 @@ export const NOTHING = "Nothing is recorded yet: the arm has not moved.";
 export class Selection {
   #page;
   #work; // exports and verifications
-  #run; // of a recorded motion
+  run; // of a recorded motion
   #saving = false;
   /** @type {[start: number | null, end: number | null]} */
   #ends = [null, null]; // [s since the epoch]; null: that of the recording
@@ -20,13 +20,8 @@ export class Selection {
   /** @param {Page.Context} page @param {HTMLElement} box that of exports and verifications */
   constructor(page, box) {
     this.#page = page;
-    this.#run = new ScriptRun(page.say, "run again");
+    this.run = new ScriptRun(page.say, "run again");
     this.#work = new Work(box);
-  }
-
-  /** Take an answer; return whether it was for the motion that runs again. @param {Page.Answer} answer */
-  hear(answer) {
-    return this.#run.hear(answer);
   }
 
   // Select all of a recording.
@@ -90,12 +85,12 @@ export class Selection {
   /** Drive the arm along the motion of the part, as a program that the bar shows and steers. @param {Part | null} part */
   async runAgain(part) {
     const { toast, store } = this.#page;
-    if (!part || this.#run.busy) return;
+    if (!part || this.run.busy) return;
     const { revocations } = store.status ?? {};
     toast("The motion is being made a program.");
     try {
       const script = await request(`api/v1/recording/script?${queryOf(part)}`);
-      const { status, why } = await this.#run.play(await script.text(), "run", revocations, () => {});
+      const { status, why } = await this.run.play(await script.text(), "run", revocations, () => {});
       toast(status === "done" ? "The motion has run again." : `The motion did not run to its end: ${why || status}`);
     } catch (error) {
       toast(`The motion cannot run again: ${messageOf(error)}`);

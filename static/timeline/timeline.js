@@ -137,7 +137,7 @@ export class Timeline {
 
   /** Take an answer; return whether it was for the motion that runs again. @param {Page.Answer} answer */
   hear(answer) {
-    return this.#selection.hear(answer);
+    return this.#selection.run.hear(answer);
   }
 
   #listen() {

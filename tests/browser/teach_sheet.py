@@ -25,13 +25,13 @@ def open_sheet(page: ViserPage) -> None:
 
 
 def reload(page: ViserPage) -> ViserPage:
-    """Load the page again and open the sheet; return the window with its new documents."""
+    """Load the page again, which opens the sheet; return the window with its new documents."""
     page.page.reload()
     page.page.locator("#holder", has_text="drive").wait_for()
     frame = next(frame for frame in page.page.frames if "/viser/" in frame.url)
     again = ViserPage(page.page, frame, page.errors)
     again.wait_ready(("/arm", MOVE))
-    open_sheet(again)
+    page.page.wait_for_selector("#teach:not([hidden])")
     return again
 
 

@@ -86,9 +86,9 @@ def test_page_offers_its_scene(page: ViserPage) -> None:
         kind = "Viser.picture({ contentWindow: window }).then(({ type }) => type)"
         assert ask(page, kind) == "image/png"
     with part("thumbnail"):
-        place = "{ contentWindow: window }, 640, 400, 300, 96, 72"
+        place = "{ contentWindow: window }, 96, 72"
         assert ask(page, f"Viser.thumbnail({place})").startswith("data:image/jpeg;base64,")
-        assert ask(page, "Viser.thumbnail({}, 0, 0, 9, 9, 9)") == ""
+        assert ask(page, "Viser.thumbnail({}, 9, 9)") == ""
     with part("drawing"):
         assert ask(page, "Viser.drawing() === Viser.viewer()")
     with part("node"):
