@@ -17,23 +17,16 @@ const KEYS = {
   KeyI: [3, 1], KeyK: [3, -1], KeyJ: [4, -1], KeyL: [4, 1],
   KeyQ: [5, 1], KeyE: [5, -1], KeyG: [6, -1], KeyH: [6, 1],
 };
-/** @type {import("./jog/steps.js").Moves} */
-const HOLDS = {
-  "pitch+": [3, 1], "pitch-": [3, -1], "roll-": [4, -1], "roll+": [4, 1],
-  "yaw+": [5, 1], "yaw-": [5, -1], "elbow-": [6, -1], "elbow+": [6, 1],
-};
 
 const none = () => [0, 0, 0, 0, 0, 0, 0];
 /** @param {string} id */
 const byId = (id) => element(id, HTMLElement);
 /** @returns {NodeListOf<HTMLButtonElement>} */
 const holdButtons = () => document.querySelectorAll("[data-hold]");
-/** @type {Set<string>} */
+/** Codes of the keys that are held, and of those whose buttons are held. @type {Set<string>} */
 const keys = new Set();
 /** @type {Record<Pad, number[]>} */
 const pads = { plane: none(), lift: none() };
-/** @type {Set<string>} */
-const holds = new Set();
 let mouse = { rates: none(), at: -Infinity };
 // Whether gamepad and SpaceMouse have to return to rest before they count.
 const parked = { pad: true, mouse: false };
@@ -48,7 +41,6 @@ let stop = () => {};
 
 export function quiet() {
   keys.clear();
-  holds.clear();
   for (const pad of /** @type {const} */ (["plane", "lift"])) centre(byId(pad), pads[pad]);
   parked.pad = true;
   parked.mouse ||= mouse.rates.some(Boolean);
@@ -67,7 +59,7 @@ function mark() {
   for (const kbd of document.querySelectorAll("#jog kbd"))
     kbd.classList.toggle("on", keys.has(`Key${kbd.textContent}`));
   for (const button of holdButtons())
-    button.classList.toggle("on", holds.has(button.dataset.hold ?? ""));
+    button.classList.toggle("on", keys.has(button.dataset.hold ?? ""));
 }
 
 /** Return whether the key moves the arm or its gripper and was handled. @param {KeyboardEvent} event */
@@ -189,14 +181,13 @@ function rates() {
   /** @param {number[]} other */
   const add = (other) => other.forEach((value, i) => (sum[i] += value));
   for (const code of keys) sum[KEYS[code][0]] += KEYS[code][1];
-  for (const hold of holds) sum[HOLDS[hold][0]] += HOLDS[hold][1];
   Object.values(pads).forEach(add);
   add(pad);
   if (!parked.mouse && performance.now() - mouse.at < MOUSE_FRESH) add(mouse.rates);
   // A yaw or an elbow that the arm does not have must not end its motion by a jog of zero rates.
-  if (steps?.freedoms !== 6) sum[5] = 0;
+  for (const axis of [5, 6]) if (!steps?.moves(axis)) sum[axis] = 0;
   // The elbow moves while the tool rests.
-  if (!steps?.turnsElbow || sum.slice(0, 6).some(Boolean)) sum[6] = 0;
+  if (sum.slice(0, 6).some(Boolean)) sum[6] = 0;
   return sum.map((value, i) => Math.max(-1, Math.min(1, value)) * (i < 3 ? LINEAR : ANGULAR));
 }
 
@@ -232,16 +223,12 @@ export function begin(options) {
     button.addEventListener("pointerdown", (event) => {
       event.preventDefault();
       button.setPointerCapture(event.pointerId);
-      holds.add(hold);
+      keys.add(hold);
       mark();
       sendJog();
     });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"])
-      button.addEventListener(end, () => {
-        holds.delete(hold);
-        mark();
-        sendJog();
-      });
+      button.addEventListener(end, () => release(hold));
     button.addEventListener("contextmenu", (event) => event.preventDefault());
   }
   if (navigator.hid) {
@@ -269,6 +256,7 @@ async function load() {
   try {
     const { Steps } = await import("./jog/steps.js");
     steps = await Steps.in(byId("jog"), say);
+    for (const button of holdButtons()) button.hidden = !steps.moves(KEYS[button.dataset.hold ?? ""][0]);
   } catch (error) {
     console.warn(`No steps in the Jog sheet: ${messageOf(error)}`);
   }

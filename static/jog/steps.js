@@ -1,6 +1,6 @@
 // Steps and gripper in the Jog sheet: one press moves the target by one step. Loaded with the sheet.
 import { element, first, styled } from "../dom.js";
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 import { readArm } from "../server.js";
 
 const SIZES = [0, 0.1, 1, 10]; // mm or degrees; 0 to hold
@@ -42,15 +42,11 @@ export class Steps {
     pads.after(this.#grid);
     if (arm.gripper) {
       for (const [code, to] of Object.entries(GRIPPER_KEYS)) {
-        const button = html("button", { type: "button" }, to === "open" ? "Open" : "Close", html("kbd", {}, code.slice(3)));
-        button.addEventListener("click", () => this.#grip(to));
-        this.#gripper.append(button);
+        this.#gripper.append(button([to === "open" ? "Open" : "Close", html("kbd", {}, code.slice(3))], () => this.#grip(to)));
       }
       pads.before(this.#gripper);
     }
     root.addEventListener("change", ({ target }) => target instanceof HTMLInputElement && this.#choose(target));
-    for (const [name, has] of [["yaw", arm.freedoms === 6], ["elbow", this.turnsElbow]])
-      for (const button of root.querySelectorAll(`[data-hold^=${name}]`)) button.toggleAttribute("hidden", !has);
     if (arm.joints_only) first("[value=joints]", HTMLInputElement, root).click();
   }
 
@@ -76,6 +72,11 @@ export class Steps {
     const place = this.freedoms === 6 ? [0, 1, 2, 4, 3, 5][axis] : axis;
     by[place] = sign * (axis < 3 ? this.#size / 1000 : this.#size * RADIANS);
     this.#say({ do: "step_tool", by, frame: this.#frame });
+  }
+
+  /** Return whether the arm has the motion of a place in AXES. @param {number} axis */
+  moves(axis) {
+    return axis === ELBOW ? this.turnsElbow : axis < 5 || this.freedoms === 6;
   }
 
   // Number of numbers in a jog or a step of the tool.
@@ -139,13 +140,11 @@ export class Steps {
     this.#grid.replaceChildren(
       ...columns.map(([name, unit], axis) => {
         /** @param {number} sign */
-        const button = (sign) => {
+        const step = (sign) => {
           const words = `${name} ${sign > 0 ? "plus" : "minus"} ${this.#size} ${unit}`;
-          const made = html("button", { type: "button", "aria-label": words }, sign > 0 ? "+" : "−");
-          made.addEventListener("click", () => this.step(axis, sign));
-          return made;
+          return button(sign > 0 ? "+" : "−", () => this.step(axis, sign), { "aria-label": words });
         };
-        return html("div", {}, button(1), html("b", {}, name), button(-1));
+        return html("div", {}, step(1), html("b", {}, name), step(-1));
       }),
     );
   }

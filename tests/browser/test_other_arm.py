@@ -49,7 +49,7 @@ def tool(page: ViserPage) -> Any:
 
 def test_a_held_key_turns_the_tool_about_the_vertical(six: ViserPage) -> None:
     six.page.click("#jog-button")
-    six.page.wait_for_selector("[data-hold='yaw+']", state="visible")
+    six.page.wait_for_selector("[data-hold=KeyQ]", state="visible")
     start = tool(six)
     six.page.keyboard.down("KeyQ")
     six.wait_until(

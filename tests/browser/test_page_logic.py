@@ -320,7 +320,7 @@ def test_elbow_of_seven_axes_moves_while_the_tool_rests(browser: Browser) -> Non
         load(page, "Jog", "jog.js")
         page.evaluate(BEGIN)
         page.evaluate("document.getElementById('jog').hidden = false")
-        page.locator("[data-hold='elbow+']").wait_for()
+        page.locator("[data-hold=KeyH]").wait_for()
         key(page, "down", "KeyH")
         moves(page, 6, 1)
         # With a motion of the tool the elbow waits.
