@@ -35,7 +35,7 @@ export function key(event) {
     if (!event.repeat) step(letter === "y" || event.shiftKey ? "redo" : "undo");
     return true;
   }
-  return !event.repeat && event.key === "Delete" && Boolean(parts.stage?.remove());
+  return !event.repeat && event.key === "Delete" && Boolean(parts.stage?.selection?.remove());
 }
 
 /** @param {Page.Status} status */

@@ -145,7 +145,7 @@ function take(answer) {
   else if ([More, parts.welcome, parts.teach, parts.timeline].some((part) => part?.hear(answer))) return;
   else if (answer.is === "refused" && answer.id !== QUIETLY) {
     page.toast(answer.why);
-    parts.stage?.refused(answer);
+    parts.stage?.joints.refused(answer);
   }
 }
 

@@ -94,13 +94,13 @@ export class Arm {
   #ask(act, hazard) {
     const tick = html("input", { type: "checkbox" });
     const words = act === "release" ? "I hold the arm by hand." : act === "calibrate" ? "The space is clear, and I have the switch in reach." : "It was calibrated since it was switched on.";
-    const go = html("button", { type: "button", class: "main", disabled: "" }, NAMES[act].replace("…", ""));
-    const back = button("Cancel", () => this.#dialog.close());
-    tick.addEventListener("change", () => (go.disabled = !tick.checked));
-    go.addEventListener("click", () => {
+    const give = () => {
       this.#dialog.close();
       this.#give(act, true);
-    });
+    };
+    const go = button(NAMES[act].replace("…", ""), give, { class: "main", disabled: "" });
+    const back = button("Cancel", () => this.#dialog.close());
+    tick.addEventListener("change", () => (go.disabled = !tick.checked));
     this.#dialog.replaceChildren(html("h1", { id: "hazard-title" }, NAMES[act].replace("…", "")), html("p", {}, hazard), html("label", {}, tick, words), html("div", { class: "acts" }, back, go));
     // Not modal, so that mouse, finger and keys still reach STOP.
     this.#dialog.show();

@@ -43,7 +43,7 @@ export class Episodes {
   /** @type {Set<number>} */
   #open = new Set(); // numbers of the episodes whose fields are shown
   #task = html("input", { maxlength: 200, placeholder: "What is to be done", autocomplete: "off" });
-  #rec = html("button", { type: "button", class: "rec" });
+  #rec = button("", () => this.#act("rec"), { class: "rec" });
   #says = html("p", {});
   #acts = html("div", { class: "acts", role: "group", "aria-label": "How did it go?" });
   #list = html("ol", {});
@@ -57,7 +57,6 @@ export class Episodes {
     for (const [act, [label, letter]] of entriesOfActs) {
       this.#acts.append(button([label, key(letter)], () => this.#act(act), { "data-act": act, "aria-keyshortcuts": letter }));
     }
-    this.#rec.addEventListener("click", () => this.#act("rec"));
     this.#task.addEventListener("keydown", (event) => {
       if (event.key !== "Enter") return;
       // The letters on the buttons are keys from now on, and Enter does not also press the button.

@@ -18,7 +18,6 @@ import { signed } from "./shape.js";
 /** @typedef {{ history: import("./history.js").History, groups: Record<string, number[]>, view: import("./plot.js").Span }} Plotted */
 const MS = 1000;
 
-// Return [{id, title, size, shown, element, draw(state, loop), knob?, plot?}].
 /** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Plotted & { say: Page.Say, touch: Api.State["touch"] }} page @returns {Instrument[]} */
 export function instruments(arm, gripper, { say, history, groups, view, touch }) {
   return [...knobs(arm, gripper, say), ...gauges(arm), ...(touch ? [grip(touch)] : []), ...plots(arm, gripper, history, groups, view)];

@@ -36,7 +36,6 @@ export class Panel {
   #age = html("span", { class: "age", title: "Maximum age of the values" });
   #body = html("div", { class: "body" }, html("p", { class: "note" }, "Waiting for the arm."));
 
-  // connection: {say, watch, kept, quietly}, that of the page to the server, and its storage.
   /** @param {HTMLElement} root @param {Connection} connection */
   constructor(root, connection) {
     this.#root = root;

@@ -128,14 +128,9 @@ export class Plot {
     return this.#colours;
   }
 
-  /** @returns {[number, number]} */
-  #ends() {
-    const end = this.#view.end ?? this.#history.newest;
-    return [end - this.#view.span, end];
-  }
-
   #paint() {
-    const [from, to] = this.#ends();
+    const to = this.#view.end ?? this.#history.newest;
+    const from = to - this.#view.span;
     const shown = this.#legend.map(({ button }) => button.getAttribute("aria-pressed") === "true");
     const axis = this.#scale(from, to, shown);
     const pen = this.#canvas.getContext("2d");

@@ -1,6 +1,6 @@
 // The address of this server for a phone, as a QR code and as text. Loaded on first use.
 import { element, styled } from "../dom.js";
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 import { messageOf, request } from "../server.js";
 
 const box = element("phone", HTMLDialogElement);
@@ -18,8 +18,7 @@ function shown({ url, code, note, command }, toast) {
   if (!text) return [head, html("p", {}, note)];
   const name = url ? "Address for a phone" : "Command that opens the server";
   const field = html("input", { readonly: "", value: text, "aria-label": name });
-  const copy = html("button", { type: "button" }, "Copy");
-  copy.addEventListener("click", async () => {
+  const copy = button("Copy", async () => {
     try {
       await navigator.clipboard.writeText(text);
       toast("It is copied.");

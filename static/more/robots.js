@@ -15,7 +15,7 @@ const search = html("input", { type: "search", placeholder: "Name or maker", "ar
 const list = html("div", { class: "list" });
 const state = html("p", { role: "status" });
 const field = html("input", { type: "file", accept: ".urdf,.xacro,.zip", hidden: "", "aria-label": "File of a robot" });
-const opener = html("button", { type: "button" }, "Open a URDF, xacro or .zip…");
+const opener = button("Open a URDF, xacro or .zip…", () => field.click());
 const details = html("form", { class: "arguments", hidden: "" });
 
 /** @type {Robot[]} */
@@ -111,18 +111,10 @@ async function upload(file, main = "") {
 const expand = () => document.getElementById("robots-button")?.setAttribute("aria-expanded", String(box.open));
 box.addEventListener("close", expand);
 search.addEventListener("input", draw);
-opener.addEventListener("click", () => field.click());
 field.addEventListener("change", () => {
   if (field.files?.length) upload(field.files[0]);
   field.value = "";
 });
-for (const type of ["dragover", "drop"])
-  box.addEventListener(type, (event) => {
-    const { dataTransfer } = /** @type {DragEvent} */ (event);
-    event.preventDefault();
-    event.stopPropagation();
-    if (type === "drop" && dataTransfer?.files.length) upload(dataTransfer.files[0]);
-  });
 /** @param {Page.Status} status */
 function note({ robot }) {
   if (!robot) return;

@@ -24,7 +24,6 @@ export class Branches {
   #label = html("p", { id: "branch-label", class: "scene-label", hidden: "" });
   #asked = 0; // number of the last question
 
-  // store: that of the page, whose status has the speed.
   /** @param {HTMLElement} stage @param {HTMLIFrameElement} scene @param {Api.Arm} arm @param {Page.Store} store */
   constructor(stage, scene, arm, store) {
     this.#scene = scene;

@@ -103,19 +103,15 @@ export class Joints {
     /** @type {Drag} */
     const drag = { joint, pointer, touch, start: pixel, pixel, grab: null, value: null, moved: false, sent: 0, timer: null };
     this.#drag = drag;
-    const viewer = this.#viewer;
-    const { axis } = this.#known.links[joint];
-    const slides = this.#known.slides[joint];
     const link = this.#link(joint);
     if (!link) return this.drop();
     link.updateWorldMatrix(true, false);
-    /** The geometry at the press, before the answer comes. @param {number} value */
-    const made = (value) => new Grab(viewer, link, point, { axis, slides }, pixel, value);
     const state = await readState();
     if (this.#drag !== drag) return;
     if (!state) return this.drop();
     drag.revocations = state.revocations;
-    drag.grab = made(state.q[joint]);
+    const { links, slides } = this.#known;
+    drag.grab = new Grab(this.#viewer, link, point, { axis: links[joint].axis, slides: slides[joint] }, pixel, state.q[joint]);
     this.#follow();
   }
 

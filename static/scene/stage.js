@@ -19,13 +19,13 @@ export class Stage {
   #stage;
   #scene;
   #page;
-  #joints;
+  joints;
   handle;
   #views;
   /** @type {Branches | null} */
   #branches = null; // only for an arm that has some
   /** @type {import("./selection.js").Selection | null} */
-  #selection = null; // the selected object, loaded with the first click on one
+  selection = null; // the selected object, loaded with the first click on one
   /** @type {Page.Pixel | null} */
   #press = null; // [x, y] of a press that may become a click
   /** @type {{ pixel: Page.Pixel | null } | null} */
@@ -41,7 +41,7 @@ export class Stage {
     this.#scene = scene;
     this.#page = page;
     styled("scene.css", import.meta.url);
-    this.#joints = new Joints(stage, scene, page);
+    this.joints = new Joints(stage, scene, page);
     this.handle = new Handle(stage, scene, page.store);
     new Clearance(stage, scene, page.store);
     this.#load();
@@ -61,14 +61,14 @@ export class Stage {
       stopped = Boolean(status.stopped);
       if (stops || (!status.mine && status.holder !== null)) this.drop();
     });
-    document.addEventListener("visibilitychange", () => document.hidden && this.#joints.lose());
+    document.addEventListener("visibilitychange", () => document.hidden && this.joints.lose());
     window.addEventListener("blur", () => this.#blur());
   }
 
   async #load() {
     const arm = await readArm().catch(() => null);
     if (!arm) return;
-    this.#joints.arm = arm;
+    this.joints.arm = arm;
     if (arm.joints_only) return;
     this.#branches = new Branches(this.#stage, this.#scene, arm, this.#page.store);
     if (this.#scene.contentWindow) this.#branches.listen(this.#scene.contentWindow);
@@ -76,30 +76,20 @@ export class Stage {
 
   // Names of the joints, such as "2 shoulder"; empty before the arm is known.
   get jointLabels() {
-    return this.#joints.arm?.links.map(({ label }) => label) ?? [];
-  }
-
-  // Remove the selected object. Return whether there is one.
-  remove() {
-    return Boolean(this.#selection?.remove());
+    return this.joints.arm?.links.map(({ label }) => label) ?? [];
   }
 
   // Select nothing.
   clear() {
-    this.#joints.select(null);
+    this.joints.select(null);
     this.handle.close();
-    this.#selection?.clear();
+    this.selection?.clear();
   }
 
   // Release what the pointer holds.
   drop() {
-    this.#joints.drop();
+    this.joints.drop();
     this.handle.drop();
-  }
-
-  /** @param {Api.Refused} answer */
-  refused(answer) {
-    this.#joints.refused(answer);
   }
 
   #listen() {
@@ -110,7 +100,7 @@ export class Stage {
     on("pointerdown", this.#down);
     on("pointermove", this.#move);
     on("pointerup", this.#up);
-    on("pointercancel", ({ pointerId }) => this.#joints.holds(pointerId) && this.#joints.lose());
+    on("pointercancel", ({ pointerId }) => this.joints.holds(pointerId) && this.joints.lose());
     on("pointerout", ({ relatedTarget }) => relatedTarget || this.#hover(null));
     on("blur", this.#blur);
     this.handle.listen(inner);
@@ -120,7 +110,7 @@ export class Stage {
 
   // The focus may only have moved between the two documents.
   #blur() {
-    setTimeout(() => document.hasFocus() || this.#joints.lose());
+    setTimeout(() => document.hasFocus() || this.joints.lose());
   }
 
   /** @param {PointerEvent} event */
@@ -128,17 +118,17 @@ export class Stage {
     const { target, pointerId, pointerType, button, isPrimary } = event;
     this.handle.note(event);
     this.#press = null;
-    if (button || !isPrimary || this.#joints.dragging || !matches(target, "canvas")) return;
+    if (button || !isPrimary || this.joints.dragging || !matches(target, "canvas")) return;
     /** @type {Page.Pixel} */
     const pixel = [event.clientX, event.clientY];
     this.#press = pixel;
     const hit = this.#pick(pixel);
-    const joint = hit && this.#joints.of(hit.object);
-    if (!hit || !this.#joints.takes(joint, pointerType === "touch")) return;
+    const joint = hit && this.joints.of(hit.object);
+    if (!hit || !this.joints.takes(joint, pointerType === "touch")) return;
     // Neither the camera nor a node behind the link gets the press.
     event.stopImmediatePropagation();
     target.setPointerCapture(pointerId);
-    this.#joints.take(joint, hit, pixel, pointerId, pointerType === "touch");
+    this.joints.take(joint, hit, pixel, pointerId, pointerType === "touch");
   }
 
   /** @param {PointerEvent} event */
@@ -146,9 +136,9 @@ export class Stage {
     /** @type {Page.Pixel} */
     const pixel = [event.clientX, event.clientY];
     this.handle.note(event);
-    if (this.#joints.holds(event.pointerId)) {
+    if (this.joints.holds(event.pointerId)) {
       event.stopImmediatePropagation();
-      this.#joints.move(pixel);
+      this.joints.move(pixel);
     } else if (event.pointerType !== "touch") this.#hover(event.buttons || !matches(event.target, "canvas") ? null : pixel);
   }
 
@@ -161,9 +151,9 @@ export class Stage {
       const pixel = this.#over?.pixel ?? null;
       this.#over = null;
       const hit = pixel && this.#pick(pixel);
-      const joint = hit ? this.#joints.of(hit.object) : null;
-      this.#joints.hover(joint, pixel);
-      if (!this.#joints.dragging) this.#point(hit?.object ?? null, joint);
+      const joint = hit ? this.joints.of(hit.object) : null;
+      this.joints.hover(joint, pixel);
+      if (!this.joints.dragging) this.#point(hit?.object ?? null, joint);
     });
   }
 
@@ -188,7 +178,7 @@ export class Stage {
 
   // Highlight the object under the pointer, or the selected one.
   #light() {
-    this.#glow.show(shapesOf(this.#pointed ?? this.#selection?.node));
+    this.#glow.show(shapesOf(this.#pointed ?? this.selection?.node));
     sceneIn(this.#scene).drawing().requestRender();
   }
 
@@ -196,7 +186,7 @@ export class Stage {
   #up(event) {
     /** @type {Page.Pixel} */
     const pixel = [event.clientX, event.clientY];
-    if (this.#joints.holds(event.pointerId) && this.#joints.release()) this.#press = null;
+    if (this.joints.holds(event.pointerId) && this.joints.release()) this.#press = null;
     const press = this.#press;
     this.#press = null;
     if (press && !event.button && Math.hypot(pixel[0] - press[0], pixel[1] - press[1]) < CLICK) this.#click(pixel);
@@ -205,14 +195,14 @@ export class Stage {
   /** Select the link or the object at a pixel; nothing beside both. @param {Page.Pixel} pixel */
   async #click(pixel) {
     const hit = this.#pick(pixel);
-    const joint = hit && this.#joints.of(hit.object);
-    this.#joints.select(joint, pixel);
+    const joint = hit && this.joints.of(hit.object);
+    this.joints.select(joint, pixel);
     const object = hit && joint === null ? this.#objectOf(hit.object) : null;
-    if (object && !this.#selection) {
+    if (object && !this.selection) {
       const { Selection } = await import("./selection.js");
-      this.#selection ??= new Selection(this.#stage, this.#scene, this.#page, () => this.#light());
+      this.selection ??= new Selection(this.#stage, this.#scene, this.#page, () => this.#light());
     }
-    this.#selection?.pick(object, pixel);
+    this.selection?.pick(object, pixel);
   }
 
   /** Look at the point of a part or an object under the pointer. @param {MouseEvent} event */

@@ -1,5 +1,5 @@
 // Long work of the server on a recording, an export or a verification: its progress, and the result.
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 import { messageOf, queryOf } from "../server.js";
 import { answered } from "./api.js";
 
@@ -17,13 +17,12 @@ export class Work {
   #doing = ""; // what it does, in words
   #words = html("p", { role: "status" });
   #bar = html("progress", { max: "1" });
-  #end = html("button", { type: "button" });
+  #end = button("", () => this.#close());
 
   /** @param {HTMLElement} box */
   constructor(box) {
     this.#box = box;
     box.replaceChildren(this.#words, this.#bar, this.#end);
-    this.#end.addEventListener("click", () => this.#close());
   }
 
   // Begin the work `what`, a format or "verify", on the part `selection`. `doing` says it in words.
