@@ -76,6 +76,7 @@ EDITS = """async ([path, text, blocks]) => {
 """Returns all edits of all blocks."""
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ["choose.yaml", "star.yaml", "boxes.yaml", "half.yaml"])
 def test_edits_keep_every_other_line_and_the_structure(browser: Browser, name: str) -> None:
     text = SCRIPTS[name]
@@ -178,6 +179,7 @@ def test_steps_are_edited_and_undone_and_the_text_follows(
     assert sheet.errors == []
 
 
+@pytest.mark.long
 def test_step_is_dragged_into_a_block(sheet: ViserPage) -> None:
     show(sheet, SCRIPT)
     rows = sheet.page.locator("#teach .steps li")
@@ -212,6 +214,7 @@ def test_mistakes_mark_their_steps_and_lead_to_their_lines(
     assert area(sheet).is_visible()
 
 
+@pytest.mark.long
 def test_first_step_is_inserted_on_a_phone(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:

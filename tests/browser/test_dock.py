@@ -131,6 +131,7 @@ def test_keys_change_the_width_within_its_limits(alone: Page) -> None:
     assert width(alone) == NARROWEST + 16.0
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("size", [WIDE, SMALL])
 def test_arm_is_whole_between_dock_and_panel(
@@ -179,6 +180,7 @@ def camera(page: ViserPage) -> list[float]:
     return place
 
 
+@pytest.mark.long
 def test_phone_opens_no_sheet_and_keeps_it_below(server: AppServer, open_page: OpenPage) -> None:
     script = """
         localStorage.setItem("katana450.sheets.open", "jog");

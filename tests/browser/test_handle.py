@@ -55,6 +55,7 @@ def test_label_says_what_a_drag_changes_until_its_end(
         assert label(page).endswith("°")
 
 
+@pytest.mark.long
 def test_label_says_how_near_the_nearest_part_is(
     page: ViserPage, truth: Truth, artefacts: Path
 ) -> None:
