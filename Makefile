@@ -23,8 +23,7 @@ CONTAINER ?= docker
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
 
-test: browser octave          ## set up and pass every check and test
-	@$(MAKE) --no-print-directory --jobs 3 lint contracts tests
+test: lint contracts browser octave tests ## set up and pass every check and test
 
 check: lint types contracts
 
@@ -49,17 +48,17 @@ octave: $(dev_ok)             ## find GNU Octave, or install it where that can b
 exchange: $(dev_ok)           ## find the programs that read our exports, or install them
 	$(bin)/python tests/exchange/tools.py
 
-# In five processes, as `tests/schedule.py` says: three of them mostly wait for browsers and servers. A test
-# that fails, as it may be starved of time, is tried once more when nothing else runs.
+# In four processes, as `tests/schedule.py` says. A test that fails, as it may be starved of time, is tried
+# once more when nothing else runs.
 tests: export PYTHONDONTWRITEBYTECODE =
 tests: $(dev_ok)
-	@# Once, for the hundreds of processes that are started, and the five that read every test.
+	@# Once, for the hundreds of processes that are started, and the four that read every test.
 	@$(bin)/python -m compileall -q app/katana450 robot_description
 	@$(pytest) --collect-only -qq tests/[a-f]*/ > /dev/null & \
 	  $(pytest) --collect-only -qq tests/[g-z]*/ > /dev/null; wait
 	@rm -rf $(VENV)/again
 	@# A process that crashes is not replaced, which xdist can wait for without end.
-	@$(pytest) --numprocesses 5 --max-worker-restart 0; status=$$?; \
+	@$(pytest) --numprocesses 4 --max-worker-restart 0; status=$$?; \
 	  [ $$status -ne 1 ] || { $(pytest) --last-failed --last-failed-no-failures none; status=$$?; }; exit $$status
 
 # With what takes long: demos as commands, programs on live servers, exports read by other programs; and
