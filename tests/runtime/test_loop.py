@@ -60,6 +60,12 @@ def parts(arm: ArmModel, session: Session) -> LoopParts:
     return LoopParts(arm, session)
 
 
+@pytest.fixture(autouse=True)
+def ordinary_priority(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the real-time priority of a loop from the thread of all later tests."""
+    monkeypatch.setattr("katana450.arm.runtime.loop.prefer_thread", lambda: None)
+
+
 def test_command_moves_the_arm_to_its_goal(arm: ArmModel, parts: LoopParts) -> None:
     ticket = parts.mailbox.put(cmd.Joint(1, 0.5))
     parts.tick()
