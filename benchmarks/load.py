@@ -25,7 +25,7 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import WebSocketException
 
 from katana450.arm.runtime.pipes.state_publisher import TIMED_TICKS
 from katana450.client import AsyncClient, aconnect
@@ -105,7 +105,7 @@ async def flood(url: str) -> None:
     while not _ended():
         # A disconnected client waits a moment before it connects again.
         await asyncio.sleep(0.1)
-        with suppress(ConnectionClosed, OSError):
+        with suppress(WebSocketException, OSError):
             async with websocket(url, "/api/v1/socket?name=Flood", max_queue=None) as socket:
                 while True:
                     await socket.send('{"do": "query"}')
@@ -129,7 +129,7 @@ async def crawl(url: str) -> None:
 async def poison(url: str) -> None:
     """Send messages to viser that no page can send."""
     while not _ended():
-        with suppress(ConnectionClosed, OSError):
+        with suppress(WebSocketException, OSError):
             path = f"/viser?page={page_name()}"
             async with websocket(url, path, enter(url), subprotocols=[SUBPROTOCOL]) as socket:
                 peer = Peer(socket)
@@ -159,7 +159,7 @@ async def inquire(url: str) -> None:
     """Ask for the branches ASKED times a second; connect again after each disconnection."""
     while not _ended():
         await asyncio.sleep(0.2)
-        with suppress(ConnectionClosed, OSError):
+        with suppress(WebSocketException, OSError):
             async with websocket(url, "/api/v1/socket?name=Inquire", max_queue=None) as socket:
                 due = time.monotonic()
                 while True:
@@ -227,7 +227,7 @@ async def _turn(
 
 
 async def _alone(work: Awaitable[None]) -> None:
-    with suppress(ConnectionClosed):
+    with suppress(WebSocketException):
         await work
 
 

@@ -123,8 +123,8 @@ def wait_for_port(port: int) -> None:
     deadline = time.monotonic() + OPEN_SECONDS
     while time.monotonic() < deadline:
         with suppress(OSError):
-            # viser probes a port before it serves there, so two connections must succeed.
-            for _ in range(2):
+            # viser probes a port before it serves there, so several connections must succeed.
+            for _ in range(4):
                 socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
                 time.sleep(0.02)
             return
