@@ -127,39 +127,30 @@ def stops(table: ClearingTable) -> list[Note]:
 
 
 @pytest.mark.parametrize("copy_first", [False, True])
-def test_stop_on_another_path_is_noted_once_with_its_presser(
-    table: ClearingTable, copy_first: bool
+@pytest.mark.parametrize("own_stop", [False, True])
+def test_press_on_another_path_is_noted_once_with_its_presser(
+    table: ClearingTable, copy_first: bool, own_stop: bool
 ) -> None:
     other = table.person("Vera", Role.VIEWER)
     table.hub.recorder.enabled = True
     table.stoppable.stop_elsewhere(pressed("Vera", other.person.key, "one", 5.0))
+    if own_stop:
+        table.hub.gate.protect("Window 1 fell silent while the arm moved.")
     if copy_first:
         table.hub.stop(other.actor, "one")
     table.wait(TICK)
     table.hub.stop(other.actor, "one")
     table.wait(TICK)
-    (note,) = stops(table)
-    assert note.actor == replace(other.actor, grounds=Grounds.SAFETY)
-    assert (note.what, note.why, note.always) == ({"stop": "pressed"}, "Vera pressed STOP.", True)
-
-
-@pytest.mark.parametrize("copy_first", [False, True])
-def test_press_that_the_gate_learns_after_its_own_stop_is_noted_once(
-    table: ClearingTable, copy_first: bool
-) -> None:
-    other = table.person("Vera", Role.VIEWER)
-    table.hub.recorder.enabled = True
-    table.stoppable.stop_elsewhere(pressed("Vera", other.person.key, "one", 5.0))
-    table.hub.gate.protect("Window 1 fell silent while the arm moved.")
-    if copy_first:
-        table.hub.stop(other.actor, "one")
-    table.wait(TICK)
-    table.hub.stop(other.actor, "one")
-    table.wait(TICK)
-    protection, press = stops(table)
-    assert protection.actor == replace(SERVER, grounds=Grounds.SERVER)
+    *protections, press = stops(table)
+    assert [note.actor for note in protections] == (
+        [replace(SERVER, grounds=Grounds.SERVER)] if own_stop else []
+    )
     assert press.actor == replace(other.actor, grounds=Grounds.SAFETY)
-    assert press.what == {"stop": "pressed", "repeated": True}
+    if own_stop:
+        assert press.what == {"stop": "pressed", "repeated": True}
+    else:
+        assert (press.what, press.why) == ({"stop": "pressed"}, "Vera pressed STOP.")
+        assert press.always
 
 
 def test_presser_without_a_window_has_the_role_and_the_number_of_its_link() -> None:

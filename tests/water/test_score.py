@@ -7,7 +7,7 @@ import math
 import pytest
 
 from katana450.extensions.programs.script.measures import water_measures
-from katana450.maths.water.flow import Course, VesselMove, WaterFlow
+from katana450.maths.water.flow import Course, WaterFlow
 from katana450.maths.water.units import MILLILITRE
 from tests.water.motions import over_basin, poured, turned_to
 
@@ -22,12 +22,6 @@ def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: WaterFlow) -> None:
     assert measures["emptied_percent"] == pytest.approx(measures["emptied_ml"] / 2.0)
 
 
-def test_score_without_water_is_nan(flow: WaterFlow) -> None:
-    empty = flow.begin(0.0, over_basin(flow.water_environment, 0.0))
-    empty = flow.step(empty, {"cup": VesselMove(over_basin(flow.water_environment, 2.0))}, 0.01)
-    assert math.isnan(water_measures(empty, Course())["emptied_percent"])
-
-
 def test_course_measures_duration_and_peak_jerk(flow: WaterFlow) -> None:
     course = Course()
     for k in range(201):
@@ -38,13 +32,3 @@ def test_course_measures_duration_and_peak_jerk(flow: WaterFlow) -> None:
     assert course.after((9.0, 9.0, 9.0), 0.0) == course
     water = flow.begin(1e-4, over_basin(flow.water_environment, 0.0))
     assert water_measures(water, course)["cup_peak_jerk_m_s3"] == course.peak_jerk
-
-
-def test_unequal_steps_do_not_change_the_peak_jerk() -> None:
-    course, t, before = Course(), 0.0, 0.01
-    for k in range(400):
-        dt = (0.01, 0.0005, 0.0105)[k % 3]
-        # Where a difference of mean velocities is exact under a constant jerk.
-        course = course.after((math.sin(3.0 * (t + (dt - before) / 3.0)), 0.0, 0.0), dt)
-        t, before = t + dt, dt
-    assert course.peak_jerk == pytest.approx(3.0, rel=1e-3)
