@@ -207,8 +207,10 @@ def test_same_text_is_attached_once_and_each_run_is_listed(tmp_path: Path) -> No
     for began in (1000.1, 1000.2):
         # Names become names of files.
         scripts.note(ScriptNote("../a b", "name: ../a b\nsteps: []\n", began, began + 0.05))
+    scripts.note(ScriptNote("late", "steps: []\n", 1001.0, 1002.0))
     store.put_all(records)
     store.close()
+    assert [run.name for run in scripts.read()] == ["late"]
     (path,) = recordings_in(folder)
     ((name, _),) = scripts_of(path).items()
     assert re.fullmatch(r"scripts/a-b-[0-9a-f]{12}\.yaml", name)

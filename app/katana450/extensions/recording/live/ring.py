@@ -214,7 +214,7 @@ class Ring:
         """Attach the scripts that run, or have run since the last sync. Raises OSError."""
         if self._writer is None or self._scripts is None or self._unsynced_t > self.last_t:
             return
-        for run in self._scripts.read():
+        for run in self._scripts.read(self.last_t):
             since, ended = run.began, run.ended
             if ended is not None and ended < self._first_t:
                 continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 
 import msgspec
@@ -47,9 +48,14 @@ class RunningScripts:
                 if run.ended is None:
                     self._runs[began] = msgspec.structs.replace(run, ended=t)
 
-    def read(self) -> list[ScriptNote]:
-        """Return the runs by their begin; one that has ended is returned once."""
+    def read(self, until: float = math.inf) -> list[ScriptNote]:
+        """Return the runs that began ``until`` [s], by their begin; an ended one is returned once.
+
+        Notes may come before the ticks of their time: those of later runs wait.
+        """
         with self._lock:
-            runs = [self._runs[began] for began in sorted(self._runs)]
-            self._runs = {run.began: run for run in runs if run.ended is None}
+            runs = [self._runs[began] for began in sorted(self._runs) if began <= until]
+            for run in runs:
+                if run.ended is not None:
+                    del self._runs[run.began]
             return runs
