@@ -27,8 +27,10 @@ from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.motion.arm_angle import elbow_points
 from katana450.resources import URDF_PATH
+from katana450.server.view.cameras import initial_camera
 from katana450.server.view.gizmo import MIN_SCALE, SIZE, Gizmo
 from katana450.server.view.gizmo import RINGS as RING_RATIO
+from katana450.server.viser_bridge.presets import CAMERA_POSES, Preset
 from katana450.settings import Settings
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.published_arms import PANDA, PINCHERX_100, UR5E
@@ -103,7 +105,14 @@ def test_rings_turn_the_tool_of_their_arm(
     gizmo.aim(state, arm.T_base_shoulder @ T)
     gizmo.follow()
     assert tuple(gizmo._rings) == RINGS[name]
+    look = initial_camera(robot)
+    eye = np.array(CAMERA_POSES[Preset.FREE].position) if look is None else look.eye
+    ray = gizmo._move.position - eye
     for ring, handle in gizmo._rings.items():
+        # The first camera of a page sees each ring as an ellipse, not as a line.
+        axes = {"pitch": [1], "roll": [0]}.get(ring, [1] if name == "PincherX-100" else [0, 1, 2])
+        widths = np.abs(ray @ so3.from_quaternion(handle.wxyz)) / np.linalg.norm(ray)
+        assert ring == "elbow" or (widths[axes] > 0.25).all()
         turned = gizmo._turned if ring == "turn" else partial(gizmo._ring_turned, ring)
         about_x = ring in ("roll", "elbow")
         start, axis = np.array(handle.wxyz), (1.0, 0.0, 0.0) if about_x else (0.0, 1.0, 0.0)

@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
@@ -33,14 +34,14 @@ class InitialCamera(NamedTuple):
     target: FloatArray
 
 
-def camera(robot: Robot) -> InitialCamera:
-    """Return a camera that sees the whole robot in its common poses."""
+def camera(robot: Robot, direction: ArrayLike = VIEW_DIRECTION) -> InitialCamera:
+    """Return a camera along ``direction`` that sees the whole robot in its common poses."""
     low, high = robot.bounds
     target = (low + high) / 2.0
     radius = max(float(np.linalg.norm(high - low)) / 2.0, 1e-3)
-    direction = np.array(VIEW_DIRECTION) / float(np.linalg.norm(VIEW_DIRECTION))
+    heading = np.asarray(direction, dtype=float) / float(np.linalg.norm(direction))
     return InitialCamera(
-        target - direction * DISTANCE_FACTOR * radius / math.sin(FIELD_OF_VIEW / 2.0), target
+        target - heading * DISTANCE_FACTOR * radius / math.sin(FIELD_OF_VIEW / 2.0), target
     )
 
 

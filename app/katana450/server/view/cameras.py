@@ -12,13 +12,14 @@ import numpy as np
 import viser
 
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.initial_camera import InitialCamera, camera, fitted
+from katana450.arm.robot.initial_camera import VIEW_DIRECTION, InitialCamera, camera, fitted
 from katana450.arm.robot.robot import Robot
-from katana450.maths.geometry import screws
+from katana450.maths.geometry import screws, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.server.viser_bridge.presets import CAMERA_POSES, CameraPose, Preset
+from katana450.settings import Settings
 
 BEHIND, ABOVE, AHEAD = 0.34, 0.16, 0.12
 """Offsets [m] of the tool camera, for a robot of the size of the Katana450.
@@ -29,6 +30,15 @@ The camera is BEHIND and ABOVE the tool point and looks at the point AHEAD of it
 
 SIZE = 1.831
 """[m] Diagonal of the bounds of the Katana450, for which the named views are made."""
+
+RING_WIDTH = 0.3
+"""[1] Ratio of width to length from which on a circle is seen as one."""
+
+TURNS_DEG, SLOPES = (0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0), (1.0, 0.6, 1.8)
+"""Turns about the vertical and slopes of the first camera, the preferred ones first.
+
+The slopes are multiples of that of ``VIEW_DIRECTION``.
+"""
 
 SIMILAR = 0.1
 """[1] Difference in size below which a robot has the views of the Katana450 as they are."""
@@ -123,10 +133,28 @@ def fixed_pose(preset: Preset, robot: Robot) -> CameraPose:
 
 
 def initial_camera(robot: Robot) -> InitialCamera | None:
-    """Return the first camera of a page; None for that of the Katana450 and arms like it."""
+    """Return the first camera of a page; None for that of the Katana450 and arms like it.
+
+    It is the first of several that sees no ring of the tool, in the posture in which the arm
+    starts, as a line; otherwise the one that sees them best.
+    """
     arm = robot.arm
-    is_alike = arm is not None and arm.kinematics.is_pitched and scale_of(robot) == 1.0
-    return None if is_alike else camera(robot)
+    if arm is None:
+        return camera(robot)
+    if arm.kinematics.is_pitched and scale_of(robot) == 1.0:
+        return None
+    T = arm.T_base_shoulder @ forward(arm.chain, arm.ready(Settings.ready))
+    axes = T[:3, :2] if arm.kinematics.is_pitched else T[:3, :3]
+
+    def width(look: InitialCamera) -> float:
+        """Return the ratio of width to length of the narrowest ring in the picture."""
+        ray = T[:3, 3] - look.eye
+        return min(float(np.abs(ray @ axes).min() / np.linalg.norm(ray)), RING_WIDTH)
+
+    turns = [so3.rotation_z(math.radians(angle)) for angle in TURNS_DEG]
+    x, y, z = VIEW_DIRECTION
+    directions = [turn @ (x, y, slope * z) for slope in SLOPES for turn in turns]
+    return max((camera(robot, direction) for direction in directions), key=width)
 
 
 def scale_of(robot: Robot) -> float:

@@ -32,7 +32,7 @@ class Preset(Enum):
 
 
 CAMERA_POSES = {
-    Preset.FREE: CameraPose((0.77, -1.33, 0.97), (0.0, 0.0, 0.35)),
+    Preset.FREE: CameraPose((1.25, -1.0, 0.72), (0.0, 0.0, 0.35)),
     Preset.FRONT: CameraPose((1.64, 0.0, 0.46), (0.0, 0.0, 0.36)),
     Preset.SIDE: CameraPose((0.0, -1.64, 0.46), (0.0, 0.0, 0.36)),
     Preset.LEFT: CameraPose((0.0, 1.64, 0.46), (0.0, 0.0, 0.36)),
