@@ -305,22 +305,38 @@ export function type(box, text) {
   }
 }
 
-// Return the {object, point} of three.js that a ray from a pixel of this document meets first in one
-// of the nodes `names`; null if it meets none, or a handle or a node with an action of its own.
-/** @param {Page.Pixel} pixel @param {string[]} names */
-export function pick([x, y], names) {
-  const { camera, canvas, scene, nodeRefFromName: nodes } = drawing();
-  const { raycaster, pointer, internal } = scene.__r3f.root.getState();
+/** @param {Page.Pixel} pixel of this document */
+function rayAt([x, y]) {
+  const { camera, canvas, scene } = drawing();
+  const { raycaster, pointer } = scene.__r3f.root.getState();
   const { left, top, width, height } = canvas.getBoundingClientRect();
   const ray = new raycaster.constructor();
   ray.setFromCamera(pointer.clone().set((2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height), camera);
-  /** @type {(object: Three.Object3D | null, what: (part: Three.Object3D) => boolean) => boolean} */
-  const isWithin = (object, what) => object !== null && (what(object) || isWithin(object.parent, what));
-  /** @param {Three.Hit} hit */
-  const acts = ({ object }) => isWithin(object, (part) => Boolean(part.__r3f?.handlers?.onPointerDown));
-  if (ray.intersectObjects(internal.interaction, true).some(acts)) return null;
+  return ray;
+}
+
+/** Return the innermost object round `object`, or itself, that fits; null without one. @param {Three.Object3D | null} object @param {(part: Three.Object3D) => boolean} fits */
+export function owner(object, fits) {
+  while (object && !fits(object)) object = object.parent;
+  return object;
+}
+
+/** Return the part of a handle, or the node with an action of its own, at a pixel of this document; null without one. @param {Page.Pixel} pixel */
+export function partAt(pixel) {
+  const { interaction } = drawing().scene.__r3f.root.getState().internal;
+  const parts = rayAt(pixel).intersectObjects(interaction, true).map(({ object }) =>
+    owner(object, (part) => Boolean(part.__r3f?.handlers?.onPointerDown)));
+  return parts.find((part) => part !== null) ?? null;
+}
+
+// Return the {object, point} of three.js that a ray from a pixel of this document meets first in one
+// of the nodes `names`; null if it meets none, or a part of `partAt`.
+/** @param {Page.Pixel} pixel @param {string[]} names */
+export function pick(pixel, names) {
+  if (partAt(pixel)) return null;
+  const { nodeRefFromName: nodes } = drawing();
   const targets = names.map((name) => nodes[name]).filter((object) => object !== undefined);
   /** @param {Three.Hit} hit */
-  const isHidden = ({ object }) => isWithin(object, (part) => !part.visible);
-  return ray.intersectObjects(targets, true).find((hit) => !isHidden(hit)) ?? null;
+  const isHidden = ({ object }) => owner(object, (part) => !part.visible) !== null;
+  return rayAt(pixel).intersectObjects(targets, true).find((hit) => !isHidden(hit)) ?? null;
 }

@@ -3,6 +3,7 @@
 // which remain the only commands.
 import { sceneIn, write } from "../dom.js";
 import { html, signed } from "../instruments/shape.js";
+import { isMesh } from "./glow.js";
 import { placeBeside } from "./place_near.js";
 
 const AXES = ["x", "y", "z"];
@@ -14,6 +15,8 @@ const STEPS = { move: 0.01, turn: 15 / DEGREES }; // m and rad, with Ctrl
 const FINE = 0.2; // fraction of the way of the pointer, with Shift
 const SOON = 5000; // ms after a drag in which a typed number belongs to it
 const FARTHEST = 1.5; // m; the server takes no larger coordinate
+const HANDLES = ["/target/move", "/target/elbow", "/handles"];
+const FADED = 0.25; // opacity of the other parts while one is under the pointer or dragged
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)$/;
 
 /**
@@ -58,6 +61,8 @@ export class Handle {
   /** @type {Drag | null} */
   #typed = null; // the one whose number is typed
   #sending = false;
+  /** @type {Three.Object3D | null} */
+  #lit = null; // the part under the pointer, or that is dragged
   /** @type {{ pixel: Page.Pixel, touch: boolean, snaps: boolean, fine: boolean }} */
   #pointer = { pixel: [0, 0], touch: false, snaps: false, fine: false };
   // The state line and the panel say the same to screen readers.
@@ -78,6 +83,22 @@ export class Handle {
       this.#enter();
     });
     this.#number.addEventListener("blur", () => this.close());
+  }
+
+  // Light the part of a handle that is under the pointer: all other parts fade. A drag keeps its part.
+  /** @param {Three.Object3D | null} part */
+  light(part) {
+    if (this.#drag || part === this.#lit) return;
+    this.#lit = part;
+    const { drawing, node } = sceneIn(this.#scene);
+    /** @type {Three.Mesh[]} */
+    const shapes = [];
+    for (const name of HANDLES) node(name)?.traverse((object) => void (isMesh(object) && shapes.push(object)));
+    const own = new Set();
+    part?.traverse((object) => own.add(object));
+    const fades = shapes.some((shape) => own.has(shape));
+    for (const shape of shapes) shape.material.opacity = fades && !own.has(shape) ? FADED : 1;
+    drawing().requestRender();
   }
 
   /** Note where the pointer is, before viser's page gets the event. @param {PointerEvent} event */
@@ -110,12 +131,15 @@ export class Handle {
     if (phase === "Update" && handle && drag.shown !== drag.raw) take(message, handle);
     if (phase !== "End") return;
     [this.#drag, this.#last, this.#ended] = [null, drag, performance.now()];
+    // A mouse is still there.
+    if (this.#pointer.touch) this.light(null);
     this.#draw();
   }
 
   // Forget the drag, which was ended by something else.
   drop() {
     this.#drag = this.#last = null;
+    this.light(null);
     this.close();
   }
 

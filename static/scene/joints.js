@@ -69,13 +69,8 @@ export class Joints {
   /** Return the number of the joint that moves an object of three.js; null without one. @param {Three.Object3D} object */
   of(object) {
     const links = this.arm?.links.map((_, joint) => this.#link(joint)) ?? [];
-    /** @type {Three.Object3D | null} */
-    let part = object;
-    for (; part; part = part.parent) {
-      const joint = links.indexOf(part);
-      if (joint >= 0) return joint;
-    }
-    return null;
+    const link = sceneIn(this.#scene).owner(object, (part) => links.includes(part));
+    return link && links.indexOf(link);
   }
 
   /** Show that the pointer can take hold of a joint; null for none. @param {number | null} joint @param {Page.Pixel | null} pixel */

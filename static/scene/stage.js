@@ -122,6 +122,7 @@ export class Stage {
     /** @type {Page.Pixel} */
     const pixel = [event.clientX, event.clientY];
     this.#press = pixel;
+    this.handle.light(sceneIn(this.#scene).partAt(pixel));
     const hit = this.#pick(pixel);
     const joint = hit && this.joints.of(hit.object);
     if (!hit || !this.joints.takes(joint, pointerType === "touch")) return;
@@ -150,7 +151,9 @@ export class Stage {
     requestAnimationFrame(() => {
       const pixel = this.#over?.pixel ?? null;
       this.#over = null;
-      const hit = pixel && this.#pick(pixel);
+      const part = pixel && sceneIn(this.#scene).partAt(pixel);
+      this.handle.light(part);
+      const hit = pixel && !part ? this.#pick(pixel) : null;
       const joint = hit ? this.joints.of(hit.object) : null;
       this.joints.hover(joint, pixel);
       if (!this.joints.dragging) this.#point(hit?.object ?? null, joint);
@@ -169,11 +172,9 @@ export class Stage {
 
   /** Return the node of the object of which `shape` is a part; null without one. @param {Three.Object3D | null} shape */
   #objectOf(shape) {
-    const { node } = sceneIn(this.#scene);
+    const { node, owner } = sceneIn(this.#scene);
     const [objects, more] = [OBJECTS.map(node), node(MORE)];
-    let object = shape;
-    while (object && !objects.includes(object) && !(more && object.parent === more)) object = object.parent;
-    return object;
+    return owner(shape, (part) => objects.includes(part) || (more !== undefined && part.parent === more));
   }
 
   // Highlight the object under the pointer, or the selected one.
@@ -214,13 +215,9 @@ export class Stage {
   // Return the point [x, y] of the table at a pixel, in m in the base frame; null if something else is there.
   /** @param {Page.Pixel} pixel @returns {Page.Pixel | null} */
   tableAt(pixel) {
-    const { node, world } = sceneIn(this.#scene);
+    const { node, owner, world } = sceneIn(this.#scene);
     const [hit, table] = [this.#pick(pixel), node(TABLE)];
-    if (!hit) return null;
-    /** @type {Three.Object3D | null} */
-    let part = hit.object;
-    while (part && part !== table) part = part.parent;
-    if (!part) return null;
+    if (!hit || !owner(hit.object, (part) => part === table)) return null;
     const { x, y } = world().worldToLocal(hit.point.clone());
     return [x, y];
   }

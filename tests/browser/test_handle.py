@@ -18,6 +18,9 @@ from tests.browser.sizes import PHONE, PORTRAIT
 
 PITCH = "/target/move/pitch"
 
+FADED = 0.25
+"""Opacity of the parts of a handle that is not under the pointer."""
+
 PIXEL = 2.0
 """Distance [mm] of a dragged handle from its target: the picture has coarse pixels."""
 
@@ -34,18 +37,36 @@ def number(text: str) -> float:
     return float(match[0].replace("−", "-"))
 
 
+def opacities(page: ViserPage) -> list[float]:
+    """Return the opacity of each shape of the handle, in order."""
+    return page.frame.evaluate(  # type: ignore[no-any-return]
+        """(name) => {
+            const shapes = [];
+            katanaScene.node(name).traverse((part) => part.isMesh && shapes.push(part));
+            return shapes.filter(({ visible }) => visible).map(({ material }) => material.opacity);
+        }""",
+        MOVE,
+    )
+
+
 def test_label_says_what_a_drag_changes_until_its_end(
     page: ViserPage, truth: Truth, artefacts: Path
 ) -> None:
-    start = truth.status()["T"][2][3]
+    start, whole = truth.status()["T"][2][3], opacities(page)
+    assert set(whole) == {1.0}
     with page.grip_arrow(MOVE, "z") as grip:
         assert label(page) == ""
+        # The line and the head of the arrow that is held are lit, the other parts fade.
+        assert sorted(opacities(page)) == [FADED] * (len(whole) - 2) + [1.0] * 2
         grip.sweep(0.04, 6)
         page.wait_until(lambda: label(page).startswith("z +"), "the label")
         assert number(label(page)) == pytest.approx(40.0, abs=PIXEL)
         assert page.page.get_attribute("#handle-label", "aria-hidden") == "true"
         page.keep(artefacts / "handle-label.png")
+        assert opacities(page).count(1.0) == 2
     page.wait_until(lambda: label(page) == "", "the label to go")
+    page.page.mouse.move(5.0, 100.0)
+    page.wait_until(lambda: opacities(page) == whole, "all parts to be lit")
     truth.wait(20.0, moving=False)
     assert truth.status()["T"][2][3] - start == pytest.approx(0.04, abs=1e-3 * PIXEL)
     with page.grip_ring(PITCH, "y") as grip:

@@ -146,6 +146,14 @@ def test_page_finds_what_is_under_a_pixel(page: ViserPage) -> None:
         assert not found("/box", "/none")
         # The handle is in front of this one, and takes the pointer.
         assert not found("/held")
+    with part("partAt"), part("owner"):
+        pixels = [list(page.project(page.node_pose(name)[:3, 3])) for name in ("/held", "/box")]
+        acts = "(part) => Viser.owner(part, (each) => each.__r3f?.handlers?.onPointerDown)"
+        whose = (
+            f"(pixels) => pixels.map(Viser.partAt).map((part) => part && part === ({acts})(part))"
+        )
+        assert page.frame.evaluate(whose, pixels) == [True, None]
+    with part("pick"):
         # What is not shown is not met.
         shapes = "Viser.node('/box').traverse((each) => each.isMesh && (each.visible = {}))"
         ask(page, shapes.format("false"))

@@ -90,7 +90,7 @@ declare namespace Three {
   interface Quaternion { x: number; y: number; z: number; w: number; clone(): Quaternion; setFromRotationMatrix(m: Matrix4): this; multiply(q: Quaternion): this; setFromAxisAngle(axis: Vector3, angle: number): this; }
   interface Matrix4 { elements: number[]; clone(): Matrix4; invert(): this; multiply(m: Matrix4): this; copy(m: Matrix4): this; }
   interface Colour { set(colour: number | string): void; }
-  interface Material { clone(): Material; dispose(): void; color: Colour; emissive?: Colour; emissiveIntensity: number; }
+  interface Material { clone(): Material; dispose(): void; color: Colour; opacity: number; emissive?: Colour; emissiveIntensity: number; }
   interface Geometry {
     attributes?: { position?: object }; boundingBox: { min: Vector3; max: Vector3 } | null; computeBoundingBox(): void;
   }
@@ -100,7 +100,7 @@ declare namespace Three {
     castShadow: boolean; receiveShadow: boolean;
     clone(recursive?: boolean): Object3D; add(child: Object3D): void; removeFromParent(): void; updateMatrix(): void;
     updateWorldMatrix(parents: boolean, children: boolean): void; worldToLocal(v: Vector3): Vector3;
-    getWorldPosition(v: Vector3): Vector3; traverseVisible(visit: (object: Object3D) => void): void;
+    getWorldPosition(v: Vector3): Vector3; traverse(visit: (object: Object3D) => void): void; traverseVisible(visit: (object: Object3D) => void): void;
     geometry?: Geometry; __r3f?: { handlers?: { onPointerDown?: object } };
   }
   interface Mesh extends Object3D { isMesh: true; material: Material; }
