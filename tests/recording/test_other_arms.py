@@ -1,9 +1,8 @@
-"""Recordings of an arm outside the five-axis family: verified, scored, exported, and run again."""
+"""Recordings of an arm outside the five-axis family: verified, exported, and run again."""
 
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,6 @@ from katana450.maths.kinematics.forward import forward
 from katana450.settings import Settings
 from tests.general_arms.links_of_arms import ur5e
 from tests.recording.lerobot_check import check_dataset, rows_of
-from tests.recording.recorded import PERIOD
 from tests.recording.sessions import record_session
 
 TOLERANCE = 1.5e-4
@@ -68,20 +66,6 @@ def test_states_have_all_axes_and_the_tool(path: Path, described: DescribedRobot
     x, y, z, w = run.orientation[-1]
     np.testing.assert_allclose(so3.from_quaternion((w, x, y, z)), T[:3, :3], atol=1e-12)
     assert float(np.ptp(run.position[:, 1])) > 0.09
-
-
-def test_score_has_the_measures_of_the_tool(
-    path: Path, urdf: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["score", str(path), "--urdf", str(urdf), "--json"]) == 0
-    (row,) = json.loads(capsys.readouterr().out)
-    run = katana450.open(path)
-    length = 1e3 * np.linalg.norm(np.diff(run.position, axis=0), axis=1).sum()
-    assert row["tool_path_mm"] == pytest.approx(length, rel=0.01)
-    step = 1e3 * np.linalg.norm(np.diff(run.position, axis=0), axis=1).max() / PERIOD
-    assert row["max_tool_speed_mm_s"] == pytest.approx(step, rel=0.02)
-    assert 0.0 < row["smallest_singular_value"] < 1.0
-    assert row["nearest_clearance_mm"] > 0.0
 
 
 def test_motion_runs_again(

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
+import katana450
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
@@ -22,12 +25,25 @@ from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.steps.trajectory import CubicSpline
+from katana450.extensions.recording.episodes.episode import (
+    Episode,
+    EpisodeGiver,
+    EpisodeOutcome,
+    message_of,
+)
+from katana450.extensions.recording.episodes.episode_folder import (
+    append_message,
+    shown_part,
+    with_episode,
+    write_episode,
+)
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import (
     simulated_states,
 )
-from katana450.extensions.recording.messages import COMMANDS, STATE
+from katana450.extensions.recording.forms import json_text
+from katana450.extensions.recording.messages import COMMANDS, EPISODES, STATE, nanoseconds
 from katana450.extensions.recording.run_again import (
     RecordedPart,
     again_script,
@@ -271,3 +287,32 @@ def test_part_with_too_much_motion_is_refused_and_a_long_one_is_coarser() -> Non
     spline = CubicSpline(rows[:, 0], np.radians(rows[:, 1:]))
     off = np.abs(spline.values_at(part.t)[:, 0] - part.setpoint[:, 0]).max()
     assert 1e-4 < off < 3.1e-4
+
+
+def test_trimmed_episode_runs_again_in_its_range(
+    dragged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "episode-0001.mcap"
+    with RecordingFile.open(dragged) as file:
+        begin, end = file.start, file.end
+    by = EpisodeGiver("Ada", "operator")
+    episode = Episode(1, "lift", begin, end, EpisodeOutcome.SUCCESS, "", by)
+    write_episode([dragged], path, episode)
+    middle = 0.4 * (end - begin)
+    with_episode(path, structs.replace(episode, end=begin + middle), "trimmed")
+    recording = katana450.open(path)
+    assert recording.script() == recording.script(0.0, middle)
+    script = tmp_path / "again.yaml"
+    capsys.readouterr()
+    assert main(["record", "again", str(path), "--out", str(script)]) == 0
+    assert script.read_text(encoding="utf-8") == recording.script()
+    # A recording that contains an episode is not the file of that episode.
+    with_episode(path, structs.replace(episode, start=begin + 0.1, end=end - 0.1), "trimmed")
+    with RecordingFile.open(path) as file:
+        assert shown_part(file, None, None) == pytest.approx((0.1, end - begin - 0.1))
+    longer = tmp_path / "longer.mcap"
+    shutil.copy(dragged, longer)
+    text = json_text(message_of(structs.replace(episode, start=begin + 0.1), end, "ended"))
+    append_message(longer, Message(EPISODES, 0, nanoseconds(end), text))
+    with RecordingFile.open(longer) as file:
+        assert shown_part(file, None, None) == (0.0, math.inf)

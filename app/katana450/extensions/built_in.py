@@ -87,12 +87,6 @@ EXTENSIONS = (
                 f"{HERE}.recording.options:add_record_options",
                 f"{HERE}.recording.serve_parts:record",
             ),
-            CliCommand(
-                "score",
-                "measure and compare recordings",
-                f"{HERE}.recording.options:add_score_options",
-                f"{HERE}.recording.scoring:score_files",
-            ),
         ),
         serve_options=f"{HERE}.recording.serve_parts:add_serve_options",
         routes=f"{HERE}.recording.serve_parts:routes",

@@ -25,7 +25,6 @@ from katana450.extensions.recording.files.simulation import (
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, PLANS, SOLIDS, TickMessage
 from katana450.extensions.recording.run_again import script_of_part
-from katana450.extensions.recording.scoring import Scored, score_file
 from katana450.extensions.recording.ticks import Verification
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -210,28 +209,6 @@ class Recording:
         with RecordingFile.open(self.path) as file:
             robot = session_for(file, None if urdf is None else Path(urdf))
             return script_of_part(file, robot, start, end)
-
-    def score(
-        self,
-        start: float | None = None,
-        end: float | None = None,
-        *,
-        urdf: str | os.PathLike[str] | None = None,
-    ) -> Scored:
-        """Return the measures of this run, as ``katana450 score`` prints them.
-
-        The result has ``values`` by their names, which end with their units.
-
-        Args:
-            start: start of the part [s] after that of the recording; None for that of the episode
-                if the file is one, which may be trimmed, or else of the recording.
-            end: its end [s]; None as for ``start``.
-            urdf: file of the recorded robot, if it is not the Katana450 of this package.
-
-        Raises:
-            InputError: the part has no motion or a gap, or its simulation differs.
-        """
-        return score_file(self.path, start, end, None if urdf is None else Path(urdf))
 
 
 def open(path: str | os.PathLike[str]) -> Recording:

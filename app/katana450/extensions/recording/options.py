@@ -1,4 +1,4 @@
-"""Options of ``katana450 record`` and ``score``, apart from their work: they load nothing heavy."""
+"""Options of ``katana450 record``, apart from their work: they load nothing heavy."""
 
 from __future__ import annotations
 
@@ -98,14 +98,6 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     for command in (trim, export):
         _add_part_options(command)
     _add_part_options(again, episode=True)
-
-
-def add_score_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``katana450 score`` to ``parser``."""
-    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="recordings")
-    _add_part_options(parser, episode=True)
-    parser.add_argument("--json", action="store_true", help="print the measures as JSON")
-    _add_urdf_option(parser)
 
 
 def _add_export_options(parser: argparse.ArgumentParser) -> None:
