@@ -33,10 +33,9 @@ from tests.waiting import until
 SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
 
-def made(hub: Hub, *, no_unattended: bool = False) -> ProgramRunner:
+def made(hub: Hub) -> ProgramRunner:
     """Make the runner as ``katana450 serve`` does."""
-    options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=no_unattended)
-    return ProgramRunner(hub, options)
+    return ProgramRunner(hub, Namespace(owner_silence=OWNER_SILENCE))
 
 
 class Staged(Table):
@@ -208,84 +207,33 @@ def test_program_of_the_driver_supersedes_the_planning_of_another(table: Staged)
     assert "Window 2, who drives, has sent another program." in notice["why"]
 
 
-LONG = 20.0
-"""Time [s] for which an owner is away: the program runs for 30 s."""
-
-
-def run(table: Staged, owner: Participant, *, unattended: bool = True) -> None:
+def run(table: Staged, owner: Participant) -> None:
     table.plan(owner)
-    table.programs.handle(owner, Steer(order=ProgramOrder.RUN, unattended=unattended))
+    table.programs.handle(owner, Steer(order=ProgramOrder.RUN))
     assert table.status == "running"
 
 
-def test_only_an_unattended_program_runs_on_without_its_owner(table: Staged) -> None:
-    owner = table.join(PAGES[0])
-    run(table, owner, unattended=False)
+def test_program_ends_without_its_owner(table: Staged) -> None:
+    run(table, table.join(PAGES[0]))
     table.wait(2.0 * OWNER_SILENCE)
     assert table.status == "stopped"
-    run(table, owner)
-    table.wait(LONG)
-    assert table.status == "running"
-    table.hub.leave(owner, for_good=True)
-    table.wait(0.5)
-    assert table.status == "running"
-    table.wait(LONG)
-    assert any(isinstance(command, cmd.Follow) for command in table.arm.commands)
 
 
-def test_unattended_program_is_shown_with_its_owner_and_begin(table: Staged) -> None:
-    owner = table.join(PAGES[0])
-    run(table, owner)
-    progress = table.progress
-    assert (progress.unattended, progress.by) == (True, "Window 1")
-    assert progress.began is not None
-    why = status.common(table.hub)["why"]
-    assert why.startswith(f"Unattended: started by Window 1 at {progress.began}.")
-    table.arm.rest = replace(table.arm.rest, paused=True)
-    assert "Unattended: started by Window 1" in status.common(table.hub)["why"]
-    table.programs.steer(owner, ProgramOrder.END)
-    progress = table.progress
-    assert not progress.unattended
-
-
-def test_window_of_the_absent_owner_or_an_admin_ends_it(table: Staged) -> None:
+def test_another_window_does_not_steer_it(table: Staged) -> None:
     owner, other = (table.join(page, Role.OPERATOR) for page in PAGES)
-    stranger = table.hub.join(
-        Identity("stranger", "Stranger", Role.OPERATOR), PAGES[0], lambda _: None
-    )
     run(table, owner)
-    # While the owner is there, another window of the same person is another participant.
     with pytest.raises(LeaseError, match="belongs to"):
         table.programs.steer(other, ProgramOrder.END)
     assert table.programs.orders(other) == ()
-    table.hub.leave(owner)
-    with pytest.raises(LeaseError, match="belongs to"):
-        table.programs.steer(stranger, ProgramOrder.END)
-    assert table.programs.orders(other) == ("end",)
-    assert status.of(table.hub, other)["pace"] == ""
-    table.programs.steer(other, ProgramOrder.END)
-    assert table.status == "stopped"
-    assert table.arm.holds
 
 
-def test_server_option_forbids_unattended_programs(session: Session) -> None:
-    table = Staged(session)
-    table.programs = made(table.hub, no_unattended=True)
-    owner = table.join(PAGES[0])
-    table.plan(owner)
-    with pytest.raises(LeaseError, match="not allowed"):
-        table.programs.handle(owner, Steer(order=ProgramOrder.RUN, unattended=True))
-
-
-def test_owner_must_be_there_when_an_unattended_program_begins(
-    table: Staged, session: Session
-) -> None:
+def test_owner_must_be_there_when_a_planned_program_begins(table: Staged, session: Session) -> None:
     """The owner falls silent before the planning ends: nothing begins to move."""
     owner = table.join(PAGES[0])
     table.plan(owner)
     # Another situation, so that the script is planned again before it runs.
     table.arm.rest = session.begin(session.ready + 0.05, 0.0, 0.0)
-    table.programs.handle(owner, Steer(order=ProgramOrder.RUN, unattended=True))
+    table.programs.handle(owner, Steer(order=ProgramOrder.RUN))
     assert not table.programs.running
     table.t += 2.0 * OWNER_SILENCE
     table.hub.tick()
@@ -295,19 +243,8 @@ def test_owner_must_be_there_when_an_unattended_program_begins(
     assert not table.programs.running
 
 
-def test_a_running_program_does_not_become_unattended(table: Staged) -> None:
-    owner = table.join(PAGES[0])
-    run(table, owner, unattended=False)
-    for order in (ProgramOrder.RUN, ProgramOrder.RESUME, ProgramOrder.END):
-        with pytest.raises(LeaseError, match="Only `run`, `step` and `continue`"):
-            table.programs.handle(owner, Steer(order=order, unattended=True))
-
-
 @pytest.mark.parametrize("revoke", [False, True])
-@pytest.mark.parametrize("present", [False, True])
-async def test_unattended_program_of_a_disconnected_person_ends(
-    table: Staged, revoke: bool, present: bool
-) -> None:
+async def test_program_of_a_disconnected_person_ends(table: Staged, revoke: bool) -> None:
     people = table.hub.people
     people.links = Mock()
     oda = Identity("oda", "Oda", Role.OPERATOR, "oda", "Oda")
@@ -316,10 +253,6 @@ async def test_unattended_program_of_a_disconnected_person_ends(
     owner = table.hub.join(oda, "page", lambda _: None)
     admin = table.hub.join(Identity("ada", "Ada", Role.ADMIN), "page", lambda _: None)
     run(table, owner)
-    if not present:
-        table.hub.leave(owner, for_good=True)
-        table.wait(1.0)
-    assert table.status == "running"
     (number,) = people.shown
     kick = requests.Kick(person=number, seconds=60.0, revoke=revoke)
     table.hub.add_handler(PeopleRequests(table.hub, Namespace()))

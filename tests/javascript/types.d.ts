@@ -120,7 +120,7 @@ declare namespace Api {
     }
   interface Progress { name: string; by: string; status: string; step: number; steps: number; line: number;
     task: string; fraction: number; seconds: number; seconds_left: number; why: string; skipped: number[];
-    unattended: boolean; began: string | null; breakpoints: number[]; can_continue: boolean; }
+    breakpoints: number[]; can_continue: boolean; }
   interface Query { do: "query"; id?: number | string | null; revocations?: number | null; made?: number | null;
     at?: "arm" | "branches" | "loop" | "objects" | "program_plan" | "state" | "world"; }
   interface Redo { do: "redo"; id?: number | string | null; revocations?: number | null; made?: number | null;
@@ -157,7 +157,7 @@ declare namespace Api {
     clearable: boolean; revocations: number; silence_profile: string; age: number; participants: number;
     water: Water | null; arm?: MeasuredArm | null; program?: Progress | null; fields?: Value[]; }
   interface Steer { do: "steer"; id?: number | string | null; revocations?: number | null; made?: number | null;
-    wait?: number | null; order: ProgramOrder; unattended?: boolean; at?: number | null; }
+    wait?: number | null; order: ProgramOrder; at?: number | null; }
   interface StepTool { do: "step_tool"; by: number[]; frame?: JogFrame; id?: number | string | null;
     revocations?: number | null; made?: number | null; wait?: number | null; }
   interface Stop { do: "stop"; id?: number | string | null; revocations?: number | null; made?: number | null;

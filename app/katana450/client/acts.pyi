@@ -292,8 +292,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
     def kick(self, person: int, seconds: float = ..., revoke: bool = ...) -> Answered:
         """Close all connections of a person, and keep the person out for a while. For admins only.
 
-        The person can still stop the arm over HTTP. A running program of the person ends, also an
-        unattended one.
+        The person can still stop the arm over HTTP. A running program of the person ends.
 
         Args:
             person: Number of the person in ``people``.

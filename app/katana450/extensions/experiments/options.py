@@ -45,11 +45,6 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     )
     add_server_options(parser, "; if none answers on this machine, one is started")
     parser.add_argument(
-        "--unattended",
-        action="store_true",
-        help="let the program run on when this command is ended or loses its connection",
-    )
-    parser.add_argument(
         "--urdf", type=Path, default=URDF_PATH, metavar="FILE", help="another arm, for --headless"
     )
     parser.add_argument(

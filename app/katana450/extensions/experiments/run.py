@@ -40,7 +40,6 @@ from katana450.extensions.real_arm.plant.axis import PROFILES
 from katana450.extensions.real_arm.plant.driver import PlantDriver
 from katana450.extras import MissingExtraError
 from katana450.platform_support import without_interrupts
-from katana450.server.api import answers
 from katana450.server.api.program_requests import ProgramOrder, Steer
 from katana450.settings import Settings
 
@@ -184,26 +183,15 @@ def run_live(text: str, script: Script, options: Namespace) -> int:
     with _server_at(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
             arm.send_script(text, options.speed)
-            arm.ask(Steer(order=ProgramOrder.RUN, unattended=options.unattended))
+            arm.ask(Steer(order=ProgramOrder.RUN))
             _follow(arm)
             return 0
         except KeyboardInterrupt:
-            if options.unattended and _runs(arm):
-                print(
-                    "\nkatana450: the program runs on, unattended. STOP ends it.", file=sys.stderr
-                )
-                return 0
             # Refused if the script is not completely sent, because then no program exists.
             with suppress(RefusedError):
                 arm.ask(Steer(order=ProgramOrder.END))
             print("\nkatana450: the program has ended; the arm holds.", file=sys.stderr)
             return 130
-
-
-def _runs(arm: Client) -> bool:
-    """Return whether the program has begun and runs unattended."""
-    program = arm.query(answers.State).program
-    return program is not None and program.unattended
 
 
 def _follow(arm: Client) -> None:

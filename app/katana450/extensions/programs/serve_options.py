@@ -23,11 +23,6 @@ def add_serve_options(parser: ArgumentParser) -> None:
         f"({MIN_SILENCE:g} to {LONGEST_OWNER_SILENCE:g}, default: %(default)s)",
     )
     parser.add_argument(
-        "--no-unattended",
-        action="store_true",
-        help="refuse programs that are to run without heartbeats of their owner",
-    )
-    parser.add_argument(
         "--programs",
         type=Path,
         metavar="DIR",

@@ -67,8 +67,6 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         why: What is wrong with the program, why it was planned again or not run, or which times of
             the script it does not keep.
         skipped: Numbers of the steps with nothing to do, and of alternatives not taken.
-        unattended: Whether it runs without heartbeats of its owner.
-        began: Time at which the run began, in UTC, in ISO 8601; null before that.
         breakpoints: Numbers of the steps before which it pauses.
         can_continue: Whether it was interrupted, and nothing has changed that prevents continue.
     """
@@ -85,8 +83,6 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     seconds_left: float = 0.0
     why: str = ""
     skipped: tuple[int, ...] = ()
-    unattended: bool = False
-    began: str | None = None
     breakpoints: tuple[int, ...] = ()
     can_continue: bool = False
 

@@ -53,13 +53,11 @@ class Program(Request, frozen=True, kw_only=True):
 class Steer(MotionRequest, frozen=True, kw_only=True):
     """Run, step, pause, resume, end or continue the planned program.
 
-    A program drives as a participant of its own. Its owner must stay connected unless ``run`` or
-    ``step`` begins it with ``unattended``; then it ends by itself, by STOP, by ``end`` of its owner
-    or an admin, or when an admin takes the lease. During planning, ``run`` and ``step`` take effect
-    afterwards, unless the arm is commanded to move, hold or stop in between; ``pause`` makes it
-    start paused, and ``end`` cancels the planning. A program that is to run from another posture or
-    scene than it was planned for is planned again first. An arm that is paused when a program
-    begins stays paused until ``resume``.
+    A program drives as a participant of its own, and its owner must stay connected. During
+    planning, ``run`` and ``step`` take effect afterwards, unless the arm is commanded to move, hold
+    or stop in between; ``pause`` makes it start paused, and ``end`` cancels the planning. A program
+    that is to run from another posture or scene than it was planned for is planned again first. An
+    arm that is paused when a program begins stays paused until ``resume``.
 
     ``run`` and ``step`` with ``at`` begin at this step, from 1, from where the arm stands; the
     steps before it are left out, except those that choose the tool frame or the speed. A program
@@ -72,7 +70,6 @@ class Steer(MotionRequest, frozen=True, kw_only=True):
     traits: ClassVar[Traits] = Traits(extension=True)
 
     order: ProgramOrder
-    unattended: bool = False
     at: Annotated[int, Meta(ge=1)] | None = None
 
 

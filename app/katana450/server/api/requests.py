@@ -154,8 +154,7 @@ class ListPeople(Request, frozen=True):
 class Kick(Request, frozen=True, kw_only=True):
     """Close all connections of a person, and keep the person out for a while. For admins only.
 
-    The person can still stop the arm over HTTP. A running program of the person ends, also an
-    unattended one.
+    The person can still stop the arm over HTTP. A running program of the person ends.
 
     Attributes:
         person: Number of the person in ``people``.

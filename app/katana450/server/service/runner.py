@@ -75,7 +75,7 @@ class Runner(RequestHandler):
         return False
 
     def end(self, participant: Participant, why: str) -> None:
-        """End the run of ``participant``, unless it is unattended, because of ``why``, a clause."""
+        """End the run of ``participant`` because of ``why``, a clause."""
 
     def tick(self) -> None:
         """Look at the arm and continue. Called every ``TICK`` after the watch over the driver."""

@@ -79,13 +79,12 @@ def _running(state: State, line: StatusLine, program: Progress) -> StatusLine:
     about = [f"step {program.step} of {program.steps}"]
     if program.seconds_left > 0.0:
         about.append(f"{duration(program.seconds_left)} left")
-    whys = [_unattended(program)] if program.unattended else []
     if state.paused:
-        whys.append(f"{program.name}: {program.task}, {', '.join(about)}.")
-        return line._replace(why=" ".join((*whys, line.why)).rstrip())
+        why = f"{program.name}: {program.task}, {', '.join(about)}. {line.why}"
+        return line._replace(why=why.rstrip())
     end = ", ".join(about)
     headline = f"{program.name}: {program.task}, {end}"
-    return StatusLine(PROGRAM, headline, " ".join((*whys, line.why)).strip(), end)
+    return StatusLine(PROGRAM, headline, line.why, end)
 
 
 def _planning(state: State, line: StatusLine, program: Progress, *, waits: bool) -> StatusLine:
@@ -131,12 +130,6 @@ def duration(seconds: float) -> str:
     """Return a time [s] in words, rounded up to whole seconds."""
     whole = math.ceil(seconds)
     return f"{whole} s" if whole < 100 else f"{whole // 60} min {whole % 60} s"
-
-
-def _unattended(program: Progress) -> str:
-    """Return a sentence on who started an unattended program, and when."""
-    start_time = "" if program.began is None else f" at {program.began}"
-    return f"Unattended: started by {program.by}{start_time}."
 
 
 def orders(program: Progress | None, *, may_begin: bool) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ import logging
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import SERVER, CommandChannel, Person, Role
@@ -17,7 +16,7 @@ from katana450.server.service.command_gate import SETTLE_TIME, RunningProgram
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Participant, session_of
+from katana450.server.service.participants import Participant
 
 log = logging.getLogger(__name__)
 
@@ -52,47 +51,23 @@ class ProgramOwner:
 
     Attributes:
         participant: the owner; None before the first program.
-        unattended: whether the program runs, or is to run, without heartbeats of the owner.
-        began: time at which the run began; None before that.
     """
 
-    def __init__(self, hub: Hub, timeout: float, *, may_be_unattended: bool = True) -> None:
-        """Begin without an owner.
-
-        ``timeout`` is the heartbeat timeout of the owner [s]. ``may_be_unattended``: whether
-        programs may run unattended.
-        """
+    def __init__(self, hub: Hub, timeout: float) -> None:
+        """Begin without an owner. ``timeout`` is the heartbeat timeout of the owner [s]."""
         self.participant: Participant | None = None
-        self.unattended = False
-        self.began: datetime | None = None
-        self._allowed = may_be_unattended
         self._hub = hub
         self._timeout = timeout
         self._seen = 0.0
 
     def change_to(self, participant: Participant, t: float) -> None:
-        """Make ``participant`` the owner of a program that has not begun, at the time ``t`` [s]."""
+        """Make ``participant`` the owner at the time ``t`` [s]."""
         self.participant, self._seen = participant, t
-        self.unattended, self.began = False, None
-
-    def begin(self, participant: Participant, t: float, *, unattended: bool) -> None:
-        """Make ``participant`` the owner of a run that begins at the time ``t`` [s]."""
-        self.change_to(participant, t)
-        self.unattended, self.began = unattended, datetime.now(UTC)
-
-    def check_unattended(self, *, unattended: bool) -> None:
-        """Raise LeaseError if an ``unattended`` run is not allowed."""
-        if unattended and not self._allowed:
-            raise LeaseError("Unattended programs are not allowed on this server.")
 
     @property
     def is_here(self) -> bool:
         """True if the owner is connected."""
         return self._connected is not None
-
-    def is_missing(self, t: float) -> bool:
-        """Return whether the owner has to be present at ``t`` [s] and sends no heartbeats."""
-        return self.is_silent(t) and not self.unattended
 
     def is_silent(self, t: float) -> bool:
         """Return whether no heartbeat was received for the heartbeat timeout before ``t`` [s]."""
@@ -102,17 +77,8 @@ class ProgramOwner:
         return t - self._seen > self._timeout
 
     def is_person(self, person: Person) -> bool:
-        """Return whether ``person`` is the owner.
-
-        Another window of the owner's link or browser is so once the owner of an unattended program
-        has left.
-        """
-        if self.participant is None:
-            return False
-        owner = self.participant.person.key
-        if self.unattended and not self.is_here:
-            return session_of(person.key) == session_of(owner)
-        return person.key == owner
+        """Return whether ``person`` is the owner."""
+        return self.participant is not None and self.participant.person.key == person.key
 
     def check_may_steer(self, person: Person) -> None:
         """Raise LeaseError if ``person`` is not the owner and may not take the lease from it."""

@@ -60,8 +60,7 @@ class ProgramRunner(Runner):
     def __init__(self, hub: Hub, options: Namespace) -> None:
         """Prepare to run programs of ``hub``. ``options``: see ``extension.add_serve_options``."""
         self.hub = hub
-        allowed = not options.no_unattended
-        self._owner = ProgramOwner(hub, options.owner_silence, may_be_unattended=allowed)
+        self._owner = ProgramOwner(hub, options.owner_silence)
         self.planner = ProgramPlanner(hub, self._owner)
         self._interruption: Interruption | None = None
         self._left_tool: LeftTool | None = None
@@ -108,8 +107,8 @@ class ProgramRunner(Runner):
         match request:
             case requests.Program(text=text, more=more, speed=speed):
                 self.script(participant, text, more=more, speed=speed)
-            case requests.Steer(order=order, unattended=unattended, at=step):
-                ticket = self.steer(participant, order, unattended=unattended, step=step)
+            case requests.Steer(order=order, at=step):
+                ticket = self.steer(participant, order, step)
                 return answers.Done(ticket=ticket, outcome=None if ticket else ACCEPTED)
             case requests.Breakpoints(steps=steps):
                 self.set_breakpoints(participant, steps)
@@ -138,12 +137,7 @@ class ProgramRunner(Runner):
             self._run = replace(self._run, pauses=self.planner.breakpoints)
 
     def steer(
-        self,
-        participant: Participant,
-        order: ProgramOrder,
-        *,
-        unattended: bool = False,
-        step: int | None = None,
+        self, participant: Participant, order: ProgramOrder, step: int | None = None
     ) -> int | None:
         """Carry out ``order`` for the program; see ``requests.Steer``. Raises LeaseError.
 
@@ -155,26 +149,21 @@ class ProgramRunner(Runner):
         check_may_drive(participant.person)
         plans = order is ProgramOrder.CONTINUE or step is not None
         begins = order in PLANNED_ORDERS and (plans or not self.running)
-        if unattended and not begins:
-            raise LeaseError("Only `run`, `step` and `continue` begin an unattended program.")
         if step is not None and order not in (ProgramOrder.RUN, ProgramOrder.STEP):
             raise LeaseError("Only `run` and `step` begin at a step.")
-        self._owner.check_unattended(unattended=unattended)
         planning = self.planner.planning
         if planning is not None and (planning.busy or self.planner.will_run):
             self._owner.check_may_steer(participant.person)
             if step is not None:
                 planning.cancel(f"{participant.person.name} runs it from step {step}.")
-                self._plan_part(participant, order, step, unattended=unattended)
+                self._plan_part(participant, order, step)
                 return None
-            ticket = self.planner.steer(participant, order)
-            self._owner.unattended = self._owner.unattended or unattended
-            return ticket
+            return self.planner.steer(participant, order)
         if plans:
-            self._plan_part(participant, order, step, unattended=unattended)
+            self._plan_part(participant, order, step)
             return None
         if begins:
-            return self._begin(participant, order, unattended=unattended)
+            return self._begin(participant, order)
         if self._runs_as is None or self._run is None:
             raise LeaseError("No program is running.")
         self._owner.check_may_steer(participant.person)
@@ -210,14 +199,13 @@ class ProgramRunner(Runner):
         """End the program of ``participant``, or the run that waits for its planning."""
         if self.owns(participant):
             self.planner.forget_run(why)
-            if self.running and not self._owner.unattended:
+            if self.running:
                 self._end(f"{why}.")
 
     def removed(self, session: str) -> None:
-        """End the program of the person of ``session``, even if it runs unattended."""
+        """End the program of the person of ``session``."""
         owner = self._owner.participant
         if owner is not None and session_of(owner.person.key) == session:
-            self._owner.unattended = False
             self.leave(owner)
 
     def tick(self) -> None:
@@ -240,7 +228,7 @@ class ProgramRunner(Runner):
         if (why := hub.halted) is not None:
             self._leave_with(runner.ended(self._run, Phase.STOPPED, why))
             return
-        if owner is not None and self._owner.is_missing(t):
+        if owner is not None and self._owner.is_silent(t):
             why = "sends no heartbeats" if self._owner.is_here else "left"
             self._end(f"{owner.person.name} {why}. A program ends without its owner.")
             return
@@ -268,11 +256,8 @@ class ProgramRunner(Runner):
         else:
             allowed = 1.0 if self._runs_as is None else self._runs_as.allowed
             progress = runner.progress(program, run, arm.state, owner.person.name, allowed)
-        began = self._owner.began
         return msgspec.structs.replace(
             progress,
-            unattended=self._owner.unattended and self.running,
-            began=None if began is None else began.isoformat(timespec="seconds"),
             breakpoints=tuple(sorted(index + 1 for index in self.planner.breakpoints)),
             can_continue=not self.running and self.planner.may_continue(self._interruption),
         )
@@ -332,26 +317,18 @@ class ProgramRunner(Runner):
         owner, planning = self._owner.participant, self.planner.planning
         if then is None or owner is None or planning is None:  # It was cancelled meanwhile.
             return
-        unattended = self._owner.unattended
         try:
             if planning.whole:
-                self.steer(owner, then, unattended=unattended)
+                self.steer(owner, then)
             elif changed := planning.changed_to(self.hub.present().state):
                 raise LeaseError(f"Not run: {changed}.")
             else:
                 check_may_drive(owner.person)
-                self._start(planning, owner, then, unattended=unattended)
+                self._start(planning, owner, then)
         except LeaseError as error:
             planning.refused = str(error)
 
-    def _plan_part(
-        self,
-        participant: Participant,
-        order: ProgramOrder,
-        step: int | None,
-        *,
-        unattended: bool,
-    ) -> None:
+    def _plan_part(self, participant: Participant, order: ProgramOrder, step: int | None) -> None:
         """Plan the program from a step, or from where it ended early, and then run it."""
         planning, interruption = self.planner.planning, self._interruption
         if planning is None:
@@ -373,11 +350,9 @@ class ProgramRunner(Runner):
             self.planner.plan(
                 participant, planning.text, planning.speed, first_step=(step or 1) - 1
             )
-        self._run, self.planner.then, self._owner.unattended = None, order, unattended
+        self._run, self.planner.then = None, order
 
-    def _begin(
-        self, participant: Participant, order: ProgramOrder, *, unattended: bool
-    ) -> int | None:
+    def _begin(self, participant: Participant, order: ProgramOrder) -> int | None:
         """Run the planned program. If the situation has changed, plan it again first."""
         planning = self.planner.require()
         changed = planning.changed_to(self.hub.present().state)
@@ -385,12 +360,12 @@ class ProgramRunner(Runner):
             self.hub.gate.check_not_stopped()
             self.planner.check_free(participant)
             self.planner.plan(participant, planning.text, planning.speed, changed)
-            self._run, self.planner.then, self._owner.unattended = None, order, unattended
+            self._run, self.planner.then = None, order
             return None
-        return self._start(planning, participant, order, unattended=unattended)
+        return self._start(planning, participant, order)
 
     def _start(
-        self, planning: Planning, participant: Participant, order: ProgramOrder, *, unattended: bool
+        self, planning: Planning, participant: Participant, order: ProgramOrder
     ) -> int | None:
         """Run the program of ``planning``, which fits the present situation."""
         assert planning.program is not None
@@ -398,7 +373,7 @@ class ProgramRunner(Runner):
         program, began = planning.program, self.hub.clock()
         follow = partial(self.follow_run, program.name, planning.text)
         self._runs_as = ProgramParticipant(self.hub, program.name, participant, follow)
-        self._owner.begin(participant, began, unattended=unattended)
+        self._owner.change_to(participant, began)
         self._interruption = self._left_tool = None
         self._run = replace(
             planning.continues or Run(began),
@@ -410,9 +385,8 @@ class ProgramRunner(Runner):
             single=order is ProgramOrder.STEP,
             pauses=self.planner.breakpoints,
         )
-        how = ", unattended" if unattended else ""
-        log.info("%s runs the program %s%s.", participant.person.name, program.name, how)
-        what = {"program": program.name, "order": order.value, "unattended": unattended}
+        log.info("%s runs the program %s.", participant.person.name, program.name)
+        what = {"program": program.name, "order": order.value}
         self.hub.recorder.note("program", participant.actor, what)
         return self._runs_as.ticket
 
