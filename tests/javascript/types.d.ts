@@ -176,7 +176,7 @@ declare namespace Api {
   interface Values { is: "values"; id?: number | string | null; values: Value[]; }
   interface Watch { do: "watch"; id?: number | string | null; revocations?: number | null; made?: number | null;
     hz: number; fields?: FieldName[]; }
-  interface Water { cup_ml: number; film_ml: number; basin_ml: number; air_ml: number; spilled_ml: number;
+  interface Water { cup_ml: number; basin_ml: number; air_ml: number; spilled_ml: number;
     vessels_ml: Record<string, number>; margin_to_rim: number; }
   interface Welcome { is: "welcome"; id?: number | string | null; name: string; number: number; role: string;
     heartbeat: number; api?: number; stop_port?: number | null; }

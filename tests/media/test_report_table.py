@@ -21,7 +21,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from tests.programs.lagging_driver import LaggingDriver
 
-WATER = {"cup_ml", "film_ml", "basin_ml", "air_ml", "spilled_ml", "cup_tilt_deg"}
+WATER = {"cup_ml", "basin_ml", "air_ml", "spilled_ml", "cup_tilt_deg"}
 
 TEXT = "steps:\n  - nudge: {axis: 5, by: 7}\n  - fill: 100\n  - nudge: {axis: 1, by: 3}\n"
 
@@ -95,7 +95,7 @@ def test_flow_is_the_loss_of_the_cup() -> None:
     t = np.linspace(0.0, 2.99, 300)
     cup: FloatArray = np.clip(200.0 - 80.0 * (t - 1.0), 100.0, 200.0)
     zero = np.zeros(300)
-    pour = PourRecord(t, cup, zero, 200.0 - cup, zero, zero, zero, zero)
+    pour = PourRecord(t, cup, 200.0 - cup, zero, zero, zero, zero)
     assert pour.flow[150] == pytest.approx(80.0)
     assert pour.flow[50] == pour.flow[299] == 0.0
 

@@ -59,7 +59,7 @@ def started(stage: Stage, steps: str, **values: object) -> tuple[Program, State]
 def glass_of(state: State) -> float:
     """Return the water in the glass [ml]; 0 before there is water."""
     vessel = None if state.poured is None else state.poured.water.vessel("glass")
-    return 0.0 if vessel is None else vessel.kept / MILLILITRE
+    return 0.0 if vessel is None else vessel.volume / MILLILITRE
 
 
 @pytest.mark.long
@@ -103,7 +103,7 @@ def test_nothing_is_spilled_beside_a_glass(
     assert states[-1].poured is not None
     water = states[-1].poured.water
     assert (water.spilled, water.basin) == (0, 0)
-    assert glass_of(states[-1]) + water.cup.kept / MILLILITRE == pytest.approx(full)
+    assert glass_of(states[-1]) + water.cup.volume / MILLILITRE == pytest.approx(full)
     assert stage.loads(states).max() <= 1.0 + 1e-6
 
 

@@ -275,6 +275,6 @@ def test_states_for_pictures_have_recorded_joints_objects_and_water(
             )
         assert (state.poured is None) == (known.poured is None)
         if state.poured is not None and known.poured is not None:
-            assert state.poured.water.cup.kept == pytest.approx(
-                known.poured.water.cup.kept, abs=1e-12
+            assert state.poured.water.cup.volume == pytest.approx(
+                known.poured.water.cup.volume, abs=1e-12
             )

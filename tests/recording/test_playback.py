@@ -90,7 +90,7 @@ def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]
         assert row is not None
         assert row.joints == moment.row.joints
         if tick.state.poured is not None and moment.water is not None:
-            inside = tick.state.poured.water.cup.kept
+            inside = tick.state.poured.water.cup.volume
             assert moment.water.cup.volume == pytest.approx(inside, abs=1e3)
     # Before the start, the first state is shown.
     first = run.at(0.0)
@@ -322,7 +322,7 @@ def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
         assert moment.water is not None
         assert wanted.poured is not None
         shown, true = still_flying(moment.water, flow.water_environment), wanted.poured.water
-        assert shown.cup.volume == pytest.approx(true.cup.kept, abs=1e4)
+        assert shown.cup.volume == pytest.approx(true.cup.volume, abs=1e4)
         assert shown.basin == pytest.approx(true.basin, abs=1e4)
         np.testing.assert_allclose(shown.cup.T, true.cup.T, atol=2e-6)
         assert [(cup.name, cup.volume) for cup in shown.others] == [("glass", volumes["glass"])]

@@ -47,50 +47,6 @@ def summed_up(cylinder: Cylinder, tilt: float, level: float) -> float:
 
 
 @repeatable
-@given(cylinders, st.floats(0.01, math.pi - 0.01), st.floats(0.0, 1.0))
-def test_volume_is_the_sum_of_its_columns(cylinder: Cylinder, tilt: float, fraction: float) -> None:
-    level = level_at(cylinder, tilt, fraction)
-    expected = summed_up(cylinder, tilt, level)
-    assert cylinder.volume(tilt, level) == pytest.approx(expected, abs=5e-4 * cylinder.capacity)
-
-
-def test_known_volumes() -> None:
-    r, h = CUP.radius, CUP.depth
-    assert CUP.volume(0.0, 0.04) == pytest.approx(math.pi * r * r * 0.04, rel=1e-14)
-    assert CUP.volume(math.pi, -0.05) == pytest.approx(math.pi * r * r * (h - 0.05), rel=1e-14)
-    # Lying, and half full.
-    assert CUP.volume(0.5 * math.pi, 0.0) == pytest.approx(0.5 * CUP.capacity, rel=1e-14)
-    # The hoof of Archimedes: a plane through a diameter of the floor, 2/3 r^2 times its height.
-    for height in (0.01, 0.05, 0.087):
-        tilt = math.atan2(height, r)
-        assert CUP.volume(tilt, 0.0) == pytest.approx(2.0 / 3.0 * r * r * height, rel=1e-13)
-
-
-@repeatable
-@given(cylinders, st.floats(0.01, math.pi - 0.01), st.floats(0.0, 1.0))
-def test_wetted_area_is_the_sum_of_its_slices(c: Cylinder, tilt: float, fraction: float) -> None:
-    level = level_at(c, tilt, fraction)
-    z = (np.arange(4000) + 0.5) * (c.depth / 4000)
-    turn = (np.arange(400) + 0.5) * (math.tau / 400)
-    across = math.sin(tilt) * c.radius
-    phi = np.arccos(np.clip((math.cos(tilt) * z - level) / across, -1.0, 1.0))
-    wall = 2.0 * c.radius * c.depth * float(phi.mean())
-    r = np.sqrt((np.arange(400) + 0.5) / 400.0)
-    floor = math.pi * c.radius**2 * float((-across * np.outer(r, np.cos(turn)) <= level).mean())
-    size = math.pi * c.radius * (c.radius + 2.0 * c.depth)
-    assert c.wetted(tilt, level) == pytest.approx(wall + floor, abs=3e-3 * size)
-
-
-def test_known_wetted_areas() -> None:
-    r, h = CUP.radius, CUP.depth
-    floor = math.pi * r * r
-    assert CUP.wetted(0.0, 0.04) == pytest.approx(floor + math.tau * r * 0.04, rel=1e-14)
-    assert CUP.wetted(0.0, h) == pytest.approx(floor + math.tau * r * h, rel=1e-14)
-    assert CUP.wetted(0.5 * math.pi, 0.0) == pytest.approx(0.5 * (floor + math.tau * r * h))
-    assert CUP.wetted(1.0, CUP.span(1.0)[0]) == pytest.approx(0.0, abs=1e-12)
-
-
-@repeatable
 @given(cylinders, tilts, fractions)
 def test_volumes_of_both_sides_add_up(cylinder: Cylinder, tilt: float, fraction: float) -> None:
     level = level_at(cylinder, tilt, fraction)

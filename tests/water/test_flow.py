@@ -18,25 +18,18 @@ from katana450.maths.water.environment import Basin, WaterEnvironment
 from katana450.maths.water.flow import (
     DISCHARGE,
     DROP_VOLUME,
-    LANDAU_LEVICH,
     VesselMove,
     Water,
     WaterFlow,
-    drained_film,
     left_over,
     weir_flow,
-    withdrawn_thickness,
 )
 from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.units import (
-    DENSITY,
     FEMTOLITRE,
     GRAVITY,
     MILLILITRE,
     ML,
-    REST_FLOW,
-    SURFACE_TENSION,
-    VISCOSITY,
     counted,
 )
 from katana450.maths.water.vectors import Vector
@@ -96,17 +89,15 @@ def test_no_motion_makes_or_loses_water(
 def test_tilted_cup_keeps_its_capacity_and_the_basin_catches_the_rest(
     flow: WaterFlow, rate: float, final: float, dt: float
 ) -> None:
-    water, drained = flow.begin(FULL, over_basin(flow.water_environment, 0.0)), 0
+    water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     for after in poured(flow, water, turned_to(final, rate), final / rate + 3.5, dt):
         checked(water, after, flow)
-        assert after.cup.kept <= water.cup.kept
-        drained = water.cup.film - after.cup.film
+        assert after.cup.volume <= water.cup.volume
         water = after
     over = water.cup.volume - counted(flow.water_environment.cup.inside.holds(final))
-    # A film stays on the wall. At the lip hangs less than a drop before the last step drained.
-    assert over < DROP_VOLUME + drained
-    assert over >= 0 or water.cup.kept == counted(FULL) or water.cup.film > -over
-    assert water.cup.film < MILLILITRE
+    # At the lip hangs less than a drop.
+    assert over < DROP_VOLUME
+    assert over >= 0 or water.cup.volume == counted(FULL)
     assert water.spilled == 0
 
 
@@ -126,7 +117,7 @@ def test_stopped_pour_flows_down_to_the_lip(flow: WaterFlow) -> None:
     assert flow.margin_to_rim(after.cup) == pytest.approx(0.0, abs=2e-5)
     last = runs[-1]
     assert 0 <= last.cup.volume - held < DROP_VOLUME
-    assert (last.basin, last.spilled) == (last.total - last.cup.kept, 0)
+    assert (last.basin, last.spilled) == (last.total - last.cup.volume, 0)
 
 
 def test_the_size_of_the_steps_hardly_matters(flow: WaterFlow) -> None:
@@ -159,7 +150,7 @@ def test_a_smooth_carry_spills_nothing_and_a_hasty_one_does(flow: WaterFlow) -> 
     water, least = carry(flow, 0.4, 0.45)
     assert least < 0.0
     assert water.spilled > MILLILITRE
-    assert water.cup.kept + water.spilled == water.total
+    assert water.cup.volume + water.spilled == water.total
 
 
 def test_the_steady_acceleration_is_where_spilling_begins(flow: WaterFlow) -> None:
@@ -222,7 +213,7 @@ def test_a_full_basin_spills_onto_the_table(environment: WaterEnvironment) -> No
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
     assert water.basin == counted(small.capacity)
-    assert water.basin + water.spilled + water.cup.kept == water.total
+    assert water.basin + water.spilled + water.cup.volume == water.total
     x, y, _ = small.at
     for puddle in water.puddles:
         assert math.hypot(puddle.at[0] - x, puddle.at[1] - y) < 0.08
@@ -235,7 +226,7 @@ def test_water_stays_in_free_fall_but_not_upside_down(flow: WaterFlow) -> None:
         water = flow.step(water, {"cup": VesselMove(T, (0.0, 0.0, -9.81))}, 0.01)
     assert water.cup.volume == water.total
     *_, water = poured(flow, water, lambda _: math.pi, 3.0, 0.01)
-    assert water.cup.kept < MILLILITRE
+    assert water.cup.volume < MILLILITRE
 
 
 def test_step_of_zero_time_only_moves_the_cup(flow: WaterFlow) -> None:
@@ -292,80 +283,3 @@ def test_tilt_for_a_flow_has_that_flow(flow: WaterFlow, rate: float, volume: flo
     tilt = tilt_for(rate * ML, volume * ML, cup)
     assert flow_at(tilt, volume * ML, cup) == pytest.approx(rate * ML, rel=1e-5)
     assert tilt > spill_tilt(cup, volume * ML) - 1e-9
-
-
-WIDTH, LENGTH = 0.19, 0.1
-"""[m] Wall of the cup, unrolled."""
-
-
-def film_of_age(age: float) -> float:
-    """Return the volume [m^3] of Jeffreys' film by quadrature of its profile."""
-    z = (np.arange(20_000) + 0.5) * (LENGTH / 20_000)
-    h = np.sqrt(VISCOSITY * z / (DENSITY * GRAVITY * age))
-    return float(h.mean()) * WIDTH * LENGTH
-
-
-@repeatable
-@given(st.floats(0.1, 20.0), st.floats(0.0, 100.0))
-def test_film_drains_as_the_profile_of_jeffreys(age: float, dt: float) -> None:
-    left = drained_film(film_of_age(age), WIDTH, LENGTH, GRAVITY, dt)
-    assert left == pytest.approx(film_of_age(age + dt), rel=1e-5)
-
-
-@repeatable
-@given(st.floats(0.1, 10.0), st.lists(st.floats(0.0, 5.0), min_size=1, max_size=5))
-def test_many_steps_are_as_one(age: float, steps: list[float]) -> None:
-    whole = once = film_of_age(age)
-    for dt in steps:
-        once = drained_film(once, WIDTH, LENGTH, GRAVITY, dt)
-    assert once == pytest.approx(drained_film(whole, WIDTH, LENGTH, GRAVITY, sum(steps)), rel=1e-12)
-
-
-def test_old_film_rests_and_a_covered_wall_has_none() -> None:
-    young, old = 60.0, 90.0
-    film = film_of_age(old)
-    assert drained_film(film, WIDTH, LENGTH, GRAVITY, 10.0) == film
-    assert 0.5 * REST_FLOW < 0.5 * film / old < REST_FLOW
-    film = film_of_age(young)
-    assert drained_film(film, WIDTH, LENGTH, GRAVITY, 10.0) < film
-    assert drained_film(1e-6, WIDTH, 0.0, GRAVITY, 0.01) == 0.0
-    assert drained_film(0.0, WIDTH, LENGTH, GRAVITY, 0.01) == 0.0
-
-
-def test_withdrawal_follows_landau_levich_or_derjaguin() -> None:
-    slow, fast = 1e-3, 200.0
-    length = math.sqrt(SURFACE_TENSION / (DENSITY * GRAVITY))
-    capillary = VISCOSITY * slow / SURFACE_TENSION
-    thin = withdrawn_thickness(slow, GRAVITY)
-    assert thin == pytest.approx(LANDAU_LEVICH * length * capillary ** (2.0 / 3.0))
-    # A millimetre per second leaves less than two micrometres of water.
-    assert 1e-6 < thin < 2e-6
-    thick = withdrawn_thickness(fast, GRAVITY)
-    assert thick == pytest.approx(math.sqrt(VISCOSITY * fast / (DENSITY * GRAVITY)))
-
-
-def test_film_moves_between_wall_and_cup_without_loss(flow: WaterFlow) -> None:
-    water = flow.begin(1.5e-4, over_basin(flow.water_environment, 0.0))
-    films = []
-
-    def tilt(t: float) -> float:
-        """Tilt for four seconds, then stand again."""
-        return min(t, 1.3) if t < 4.0 else max(1.3 - 0.5 * (t - 4.0), 0.0)
-
-    for after in poured(flow, water, tilt, 8.0, 0.02):
-        assert after.total == water.total
-        assert after.cup.film >= 0
-        films.append(after.cup.film / MILLILITRE)
-        water = after
-    # The cup stands again; the film drains into it.
-    assert max(films) > films[-1] > 0.0
-    assert films[-1] < films[-20]
-    assert flow.film_rests(water.cup) is False
-
-
-def test_carried_cup_has_no_film(flow: WaterFlow) -> None:
-    water = flow.begin(1.5e-4, over_basin(flow.water_environment, 0.0))
-    for k in range(100):
-        pull = (1.5 * math.sin(0.05 * k), 0.0, 0.0)
-        water = flow.step(water, {"cup": VesselMove(water.cup.T, pull)}, 0.01)
-    assert water.cup.film == 0

@@ -133,9 +133,8 @@ class ControlLoop:
         # A state that differs only in its time is not published.
         changed = is_given or _differs(before, state)
         self._resting = not (changed or state.moving or state.objects_move)
-        # Only time has passed, and nothing waits for it, as a film of water does that drains.
+        # Only time has passed, and nothing waits for it.
         self._settled = self._resting and not (state.under_way or state.blocked)
-        self._settled = self._settled and state.poured is before.poured
         if changed:
             self.state_publisher.note(_outcomes(drained, state))
             self.state_publisher.publish(Snapshot(state, drained.last))
@@ -233,8 +232,7 @@ def _differs(a: State, b: State) -> bool:
         or a.mode is not b.mode
         or a.findings != b.findings
         or a.objects is not b.objects
-        # Not by the time for which a film has still to drain.
-        or (a.poured and a.poured.water) is not (b.poured and b.poured.water)
+        or a.poured is not b.poured
         or a.appearance is not b.appearance
         or (a.report and a.report.mode) is not (b.report and b.report.mode)
     )

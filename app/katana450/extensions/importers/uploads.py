@@ -84,7 +84,7 @@ def _stored(hub: Hub, arm: ArmHandle) -> StoredScene:
         )
     water = None
     if state.poured is not None:
-        water = ML * state.poured.water.cup.kept / MILLILITRE
+        water = ML * state.poured.water.cup.volume / MILLILITRE
     keys = dict.fromkeys(t.solid.key for t in state.objects if t.solid is not None)
     meshes = tuple(hub.meshes.need(key) for key in keys)
     return StoredScene(Scene(state.objects, water, state.q), meshes)

@@ -234,7 +234,7 @@ class TaskEnvironment(gymnasium.Env[Numbers, Numbers]):
         if self._state.poured is None:
             return 0.0, 0.0
         water = self._state.poured.water
-        return water.cup.kept / MILLILITRE, water.basin / MILLILITRE
+        return water.cup.volume / MILLILITRE, water.basin / MILLILITRE
 
     def _observation(self) -> Numbers:
         poses = (self._tool(), *map(self._pose, self._names))

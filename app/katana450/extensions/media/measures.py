@@ -225,14 +225,13 @@ class PourRecord:
 
     Attributes:
         t: (N,) [s].
-        cup, film, basin, air, spilled: (N,) volumes [ml].
+        cup, basin, air, spilled: (N,) volumes [ml].
         tilt: (N,) tilt of the cup [rad].
         lip: (N,) height of the lip above the water [m]; NaN for an empty cup.
     """
 
     t: FloatArray
     cup: FloatArray
-    film: FloatArray
     basin: FloatArray
     air: FloatArray
     spilled: FloatArray
@@ -243,20 +242,19 @@ class PourRecord:
     def of(run: Simulation) -> PourRecord | None:
         """Return the record of ``run``; None for one without water."""
         rows = np.array([_row(state.poured) for state in run.states])
-        if not (np.nan_to_num(rows[:, :5]) > 0.0).any():
+        if not (np.nan_to_num(rows[:, :4]) > 0.0).any():
             return None
-        cup, film, basin, air, spilled, tilt = rows.T
+        cup, basin, air, spilled, tilt = rows.T
         lip = np.where(np.isfinite(run.margin) & (cup > 0.0), run.margin, math.nan)
-        return PourRecord(run.t, cup, film, basin, air, spilled, tilt, lip)
+        return PourRecord(run.t, cup, basin, air, spilled, tilt, lip)
 
     @property
     def flow(self) -> FloatArray:
         """The flow out of the cup (N,) [ml/s], the mean of FLOW_TICKS ticks."""
-        content = self.cup + self.film
-        before = np.roll(content, FLOW_TICKS)
+        before = np.roll(self.cup, FLOW_TICKS)
         before[:FLOW_TICKS] = math.nan
         passed = self.t - np.roll(self.t, FLOW_TICKS)
-        rate = (before - content) / np.where(passed > 0.0, passed, math.nan)
+        rate = (before - self.cup) / np.where(passed > 0.0, passed, math.nan)
         # The filling of the cup is no flow.
         return np.maximum(np.nan_to_num(rate), 0.0)
 
@@ -265,7 +263,6 @@ class PourRecord:
         """The columns (N,) of the water in the table of a run, by their names."""
         return {
             "cup_ml": self.cup,
-            "film_ml": self.film,
             "basin_ml": self.basin,
             "air_ml": self.air,
             "spilled_ml": self.spilled,
@@ -275,11 +272,11 @@ class PourRecord:
 
 
 def _row(poured: MotionWithWater | None) -> tuple[float, ...]:
-    """Return the five volumes [ml] and the tilt [rad] of `PourRecord`."""
+    """Return the four volumes [ml] and the tilt [rad] of `PourRecord`."""
     if poured is None:
-        return (math.nan,) * 6
+        return (math.nan,) * 5
     water = poured.water
-    volumes = (water.cup.volume, water.cup.film, water.basin, water.air, water.spilled)
+    volumes = (water.cup.volume, water.basin, water.air, water.spilled)
     return (
         *(volume / MILLILITRE for volume in volumes),
         math.acos(min(max(float(water.cup.T[2, 2]), -1.0), 1.0)),

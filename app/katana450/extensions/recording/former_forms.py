@@ -1,7 +1,7 @@
 """Forms of older versions, which recorded only the cup, with a liquid of several.
 
 They named commands by the classes of their time, which counted axes from 0. Their files are read,
-and the digests of their states are still made, so that they verify.
+and their setpoints verify; so do the digests of their states without water.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from katana450.arm.control.state.modes import Following, Positioning, Target
 from katana450.arm.control.state.scene_objects import Attachment
 from katana450.extensions.recording.forms import FormError, shown
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.water.flow import MotionWithWater
+from katana450.maths.water.flow import MotionWithWater, VesselWater
 from katana450.maths.water.units import ML
 
 FORMER: Mapping[str, Any] = {"liquid": ["water", 998.2, 1.0016e-3, 72.74e-3, [74, 148, 192]]}
@@ -112,15 +112,29 @@ def upgraded(kind: type, form: Mapping[str, Any], detours: list[Any]) -> Mapping
     if kind is Positioning:
         detours += filter(None, [form.get("detour")])
         return {name: content for name, content in form.items() if name != "detour"}
-    if kind is not MotionWithWater or "motions" in form:
+    if kind is VesselWater and "film" in form:
+        return _without_film(form)
+    if kind is not MotionWithWater:
         return form
     whole, water = dict(form), form.get("water")
+    whole.pop("waited", None)
+    if "motions" in form:
+        return whole
     if not isinstance(water, dict):
         raise FormError(f"{shown(water)} is not the water of a cup")
     water = dict(water)
     cup = {now: water.pop(name) for name, now in zip(WRITTEN, OF_CUP, strict=True) if name in water}
     motion = {name: whole.pop(name) for name in OF_MOTION if name in whole}
     return whole | {"water": water | {"vessels": [{"name": CUP} | cup]}, "motions": [motion]}
+
+
+def _without_film(form: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return ``form`` of the water in a vessel, a part of which once clung to the wall."""
+    film, volume = form["film"], form.get("volume")
+    if not (isinstance(film, int) and isinstance(volume, int)):
+        raise FormError(f"{shown(film)} is not the film of a vessel")
+    rest = {name: content for name, content in form.items() if name not in ("film", "wetted")}
+    return rest | {"volume": volume + film}
 
 
 def target_content(target: Target) -> tuple[str, Any]:
@@ -131,21 +145,3 @@ def target_content(target: Target) -> tuple[str, Any]:
         position, pitch, roll = target.position, target.pitch, target.roll
         return "ToolTarget", {"position": position, "pitch": pitch, "roll": roll}
     return "ToolPose", {"position": target.position, "R": target.R}
-
-
-def poured_content(poured: MotionWithWater | None) -> dict[str, Any] | None:
-    """Return the content of the water for a digest, in the order of older versions."""
-    if poured is None:
-        return None
-    water, cup, others = poured.water, poured.water.cup, poured.water.others
-    content = {
-        "water": {
-            "cup": cup.volume,
-            **{name: getattr(water, name) for name in ("basin", "parcels", "puddles")},
-            **{"slosh": cup.slosh, "T_base_cup": cup.T, "film": cup.film, "wetted": cup.wetted},
-            **FORMER,
-        },
-        **vars(poured.motions[0]),
-        "waited": poured.waited,
-    }
-    return content | ({"others": (others, poured.motions[1:])} if others else {})

@@ -374,14 +374,14 @@ def _water(water: Water) -> WaterMessage:
     Parcels fly freely, so each is described once.
     """
     message = WaterMessage(
-        water.cup.kept / MILLILITRE,
+        water.cup.volume / MILLILITRE,
         water.basin / MILLILITRE,
         water.air / MILLILITRE,
         water.spilled / MILLILITRE,
         _lean(water.cup),
     )
     message.vessels = [
-        VesselWaterMessage(vessel.name, vessel.kept / MILLILITRE, _lean(vessel))
+        VesselWaterMessage(vessel.name, vessel.volume / MILLILITRE, _lean(vessel))
         for vessel in water.others
     ]
     if water.parcels and water.parcels[-1].age == 0.0:

@@ -34,7 +34,7 @@ from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.recording.codec import Codec
-from katana450.extensions.recording.former_forms import poured_content, target_content
+from katana450.extensions.recording.former_forms import target_content
 from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.messages import GivenCommand, SentAnswer, TickMessage
 from katana450.maths.geometry.arrays import FloatArray
@@ -45,7 +45,6 @@ take less room than others beside numbers."""
 
 APART = ("t", "mode", "objects", "bodies")
 PLAIN = tuple(field.name for field in fields(State) if field.name not in APART)
-POURED = PLAIN.index("poured")
 
 
 def _hook(value: Any) -> Any:
@@ -81,7 +80,6 @@ class Digester:
             self._objects = state.objects
             self._of_objects = hashlib.blake2b(self._encoder.encode(state.objects)).digest()
         values = [getattr(state, name) for name in PLAIN]
-        values[POURED] = poured_content(state.poured)
         content = values, self._of_objects, _mode(state.mode)
         # Older versions have none.
         bodies = () if state.bodies is None else (state.bodies,)

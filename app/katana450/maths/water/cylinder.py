@@ -63,15 +63,6 @@ class Cylinder:
         """Return the volume [m^3] below the plane."""
         return self.radius**2 * self.depth * self._mean(tilt, level, _mean_segment)
 
-    def wetted(self, tilt: float, level: float) -> float:
-        """Return the area [m^2] of wall and floor below the plane.
-
-        A slice wets the wall on the arc 2 r phi.
-        """
-        floor = _segment(_half_angle(level, self.radius * math.sin(tilt)))
-        wall = 2.0 * self.depth * self._mean(tilt, level, _mean_half_angle)
-        return self.radius * (wall + self.radius * floor)
-
     def _mean(self, tilt: float, level: float, cut: Callable[[float, float], float]) -> float:
         """Return the mean over all slices of a function of phi that is pi in a wet slice.
 
@@ -168,16 +159,6 @@ def _mean_segment(a: float, b: float) -> float:
         return _segment(m)
     spread = _one_less_cotangent(d) + math.sin(d) ** 2 * (1.0 - 4.0 / 3.0 * cosine**2)
     return _segment(m) + cosine / sine * spread
-
-
-def _mean_half_angle(a: float, b: float) -> float:
-    """Return the mean of the half angle as its height changes from half angle ``a`` to ``b``.
-
-    The integral of phi over the height -cos phi, divided by the change of height.
-    """
-    m, d = 0.5 * (a + b), 0.5 * abs(b - a)
-    sine = math.sin(m)
-    return m if sine <= 0.0 or d == 0.0 else m + math.cos(m) / sine * _one_less_cotangent(d)
 
 
 def _one_less_cotangent(d: float) -> float:

@@ -31,11 +31,6 @@ class Cup:
         """The height [m] of its rim."""
         return self.floor + self.inside.depth
 
-    @property
-    def wall(self) -> float:
-        """The area [m^2] of its inner wall and floor."""
-        return math.pi * self.inside.radius * (2.0 * self.inside.depth + self.inside.radius)
-
     def sized(self, outer_radius: float, height: float) -> Cup:
         """Return a cup of the same shape with another radius and height [m]."""
         wide, tall = outer_radius / self.outer_radius, height / self.mouth

@@ -1,9 +1,8 @@
 """The flow of the water: where it is, and where it is one time step later.
 
 Water that a tilted vessel cannot hold leaves over the lip, flies in parcels and lands in the basin,
-in a vessel, on the table or on the floor. A film stays on the wall where the surface has fallen,
-and drains into the rest. Volumes are whole femtolitres that are only moved, so their sum is
-constant.
+in a vessel, on the table or on the floor. Volumes are whole femtolitres that are only moved, so
+their sum is constant.
 """
 
 from __future__ import annotations
@@ -23,54 +22,12 @@ from katana450.maths.water.environment import Cup, WaterEnvironment
 from katana450.maths.water.parcel import Ground, Parcel, Puddle, landing, spill
 from katana450.maths.water.slosh import Slosh, damping, frequency
 from katana450.maths.water.units import (
-    DENSITY,
     FEMTOLITRE,
     GRAVITY,
     MILLILITRE,
-    REST_FLOW,
-    SURFACE_TENSION,
-    VISCOSITY,
     counted,
 )
 from katana450.maths.water.vectors import Vector, add, norm, scale, sub, vector
-
-LANDAU_LEVICH = 0.944
-"""Factor [1] of the law of Landau and Levich. Their thickness divided by that of Derjaguin is this
-factor times the sixth root of the capillary number.
-"""
-
-
-def withdrawn_thickness(speed: float, g: float) -> float:
-    """Return the thickness [m] of the film that a surface leaves as it recedes along a wall.
-
-    A thick film is limited by gravity, (mu U / rho g)^(1/2) (Derjaguin, C. R. Acad. Sci. URSS 39,
-    1943), and a thin one by surface tension, 0.944 (sigma / rho g)^(1/2) Ca^(2/3) with
-    Ca = mu U / sigma (Landau and Levich, Acta Physicochim. URSS 17, 1942). The smaller one holds.
-
-    ``speed`` U [m/s] along the wall; ``g`` [m/s^2] along the wall, above 0.
-    """
-    capillary = VISCOSITY * speed / SURFACE_TENSION
-    limited: float = min(LANDAU_LEVICH * capillary ** (1.0 / 6.0), 1.0)
-    return limited * math.sqrt(VISCOSITY * speed / (DENSITY * g))
-
-
-def drained_film(volume: float, width: float, length: float, g: float, dt: float) -> float:
-    """Return what is left of a film of ``volume`` [m^3] after ``dt`` [s].
-
-    A film that drains for the time t down a wall has the thickness (mu z / (rho g t))^(1/2) at the
-    distance z from its upper edge (Jeffreys, The draining of a vertical plate, Proc. Camb. Phil.
-    Soc. 26, 1930). Integrated over the wall, its volume is (2/3) width length^(3/2)
-    (mu / (rho g t))^(1/2). The volume gives t, the age of the film; so any number of steps gives
-    the same as one. A film that loses less than REST_FLOW stays.
-
-    ``width`` and ``length`` [m] of the wall across and along the flow, ``g`` [m/s^2] along it.
-    """
-    rate = DENSITY * g * volume * volume
-    if rate == 0.0 or length == 0.0:
-        return 0.0 if length == 0.0 else volume
-    age = 4.0 / 9.0 * width**2 * length**3 * VISCOSITY / rate
-    return volume if volume < 2.0 * age * REST_FLOW else volume / math.sqrt(1.0 + dt / age)
-
 
 DISCHARGE = 0.61
 """Discharge coefficient [1] in Poleni's rule for a sharp edge: Kirchhoff's pi / (pi + 2)."""
@@ -118,8 +75,8 @@ def left_over(over: int, weir: float, dt: float) -> int:
     return int(left) if left > DROP_VOLUME else 0
 
 
-MAX_FILM = 0.25
-"""Maximum thickness of the film where it is left, relative to the radius of the cup."""
+AT_THE_MOUTH = 1e-9
+"""[m] Height over the mouth up to which water has just left over the lip, and does not fall in."""
 
 LEVEL_SINE = 1e-9
 """Sine of a tilt below which no side of the rim is the lower one."""
@@ -137,24 +94,15 @@ class VesselWater:
 
     Attributes:
         name: name of the vessel.
-        volume: volume without the film.
+        volume: volume.
         T: pose (4, 4) of the vessel in the base frame [m].
         slosh: lean of the surface.
-        film: volume on the wall.
-        wetted: area [m^2] of wall and floor below the surface.
     """
 
     name: str
     volume: int
     T: FloatArray
     slosh: Slosh = REST
-    film: int = 0
-    wetted: float = 0.0
-
-    @property
-    def kept(self) -> int:
-        """The volume with the film."""
-        return self.volume + self.film
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +144,7 @@ class Water:
     @property
     def total(self) -> int:
         """The volume of all water; a step never changes it."""
-        return sum(vessel.kept for vessel in self.vessels) + self.basin + self.air + self.spilled
+        return sum(vessel.volume for vessel in self.vessels) + self.basin + self.air + self.spilled
 
     def vessel(self, name: str) -> VesselWater | None:
         """Return the water in the vessel ``name``; None without such a vessel."""
@@ -248,12 +196,7 @@ class WaterFlow:
             raise InputError(
                 f"The cup cannot hold {volume * 1e6:g} ml; give 0 to {maximum:.1f} ml."
             )
-        return Water((self.rest("cup", counted(volume), T_base_cup),))
-
-    def rest(self, name: str, volume: int, T_base_vessel: FloatArray) -> VesselWater:
-        """Return ``volume`` [fl] at rest in a vessel."""
-        water = VesselWater(name, volume, frozen(T_base_vessel))
-        return replace(water, wetted=self._wetted(water))
+        return Water((VesselWater("cup", counted(volume), frozen(T_base_cup)),))
 
     def step(self, water: Water, moves: Mapping[str, VesselMove], dt: float) -> Water:
         """Return the water after ``dt`` [s], with the vessels moved meanwhile.
@@ -271,19 +214,12 @@ class WaterFlow:
         ]
         water = self._fly(replace(water, vessels=tuple(swung)), poses, dt)
         vessels, parcels = [], list(water.parcels)
-        for vessel, T, pull in zip(water.vessels, poses, pulls, strict=True):
+        for vessel, T in zip(water.vessels, poses, strict=True):
             left, parcel = self._pour(vessel, T, dt)
-            vessels.append(self._drain(left, _along_wall(T, pull), dt))
+            vessels.append(left)
             if parcel is not None:
                 parcels.append(parcel)
         return replace(water, vessels=tuple(vessels), parcels=tuple(parcels))
-
-    def film_rests(self, water: VesselWater) -> bool:
-        """Return True if no film drains while the vessel rests."""
-        width, length = self._film_size(water, water.wetted)
-        film = water.film * FEMTOLITRE
-        g = _along_wall(water.T, (0.0, 0.0, 0.0))
-        return drained_film(film, width, length, g, 1.0) == film
 
     def surface(self, water: VesselWater) -> WaterSurface:
         """Return the surface in a vessel."""
@@ -328,40 +264,6 @@ class WaterFlow:
         left = replace(water, volume=water.volume - poured, T=T)
         return left, Parcel(poured, lip, velocity, 0.0, dt)
 
-    def _drain(self, water: VesselWater, g: float, dt: float) -> VesselWater:
-        """Leave a film where the surface fell, cover it where it rose, and let it drain.
-
-        ``g`` [m/s^2] is gravity along the wall. The film drains into the water of the vessel.
-        """
-        wetted = self._wetted(water)
-        fallen = water.wetted - wetted
-        if (water.film == 0 and fallen <= 0.0) or g < MIN_GRAVITY:
-            return replace(water, wetted=wetted)
-        inside, film = self._inside(water), water.film
-        if fallen > 0.0:
-            speed = fallen / (math.tau * inside.radius * dt)
-            thickness = withdrawn_thickness(speed, g)
-            film += min(counted(fallen * min(thickness, MAX_FILM * inside.radius)), water.volume)
-        else:
-            dry = self.water_environment.vessels[water.name].wall - water.wetted
-            film -= min(int(film * -fallen / dry), film) if dry > 0.0 else film
-        width, length = self._film_size(water, wetted)
-        volume = film * FEMTOLITRE
-        left = drained_film(volume, width, length, g, dt)
-        film = film if left == volume else min(counted(left), film)
-        return replace(water, volume=water.kept - film, film=film, wetted=wetted)
-
-    def _film_size(self, water: VesselWater, wetted: float) -> tuple[float, float]:
-        """Return width and length [m] of the wall outside the ``wetted`` area [m^2]."""
-        vessel = self.water_environment.vessels[water.name]
-        width = math.tau * vessel.inside.radius
-        return width, max(vessel.wall - wetted, 0.0) / width
-
-    def _wetted(self, water: VesselWater) -> float:
-        """Return the area [m^2] of wall and floor below the surface in a vessel."""
-        surface = self.surface(water)
-        return self._inside(water).wetted(surface.tilt, surface.level)
-
     def _fly(self, water: Water, poses: Sequence[FloatArray], dt: float) -> Water:
         """Move the parcels by ``dt`` [s], and let those land that reach a surface.
 
@@ -381,7 +283,7 @@ class WaterFlow:
                 (
                     number
                     for number, mouth in enumerate(mouths)
-                    if parcel.volume + vessels[number].kept <= counted(mouth[0].inside.capacity)
+                    if parcel.volume + vessels[number].volume <= counted(mouth[0].inside.capacity)
                     and _caught(*mouth, parcel, dt)
                 ),
                 None,
@@ -421,7 +323,7 @@ def _caught(vessel: Cup, before: se3.Rows, after: se3.Rows, parcel: Parcel, dt: 
     if q[2] > vessel.mouth or after[2][2] <= 0.0:
         return False
     p = _seen_from(before, parcel.at(parcel.age))
-    if p[2] <= vessel.mouth:
+    if p[2] <= vessel.mouth + AT_THE_MOUTH:
         return False
     fraction = (p[2] - vessel.mouth) / (p[2] - q[2])
     x, y, _ = add(p, scale(fraction, sub(q, p)))
@@ -449,17 +351,6 @@ def _outwards(T: FloatArray, tilt: float, downhill: Vector) -> Vector:
     steep = min(tilt, 0.5 * math.pi)
     local = (math.cos(steep) * downhill[0], math.cos(steep) * downhill[1], math.sin(steep))
     return vector(T[:3, :3] @ local)
-
-
-def _along_wall(T: FloatArray, pull: Vector) -> float:
-    """Return the apparent gravity [m/s^2] along the wall of a vessel that accelerates by ``pull``.
-
-    It is the root mean square round the wall: the component along the axis, and that along the
-    circumference, which is down on the sides of a lying vessel.
-    """
-    apparent = sub((0.0, 0.0, -GRAVITY), pull)
-    along = float(T[0, 2] * apparent[0] + T[1, 2] * apparent[1] + T[2, 2] * apparent[2])
-    return math.sqrt(0.5 * (norm(apparent) ** 2 + along**2))
 
 
 def _moved(T: FloatArray, point: Vector) -> Vector:
@@ -521,14 +412,10 @@ class VesselMotion:
 
 @dataclass(frozen=True, eq=False)
 class MotionWithWater:
-    """The water and the motion of each vessel.
-
-    ``waited``: time [s] for which the films have still to drain, in vessels at rest.
-    """
+    """The water and the motion of each vessel."""
 
     water: Water
     motions: tuple[VesselMotion, ...]
-    waited: float = 0.0
 
     @property
     def course(self) -> Course:
@@ -537,7 +424,7 @@ class MotionWithWater:
 
     @property
     def still(self) -> bool:
-        """True if the water is at rest as long as no vessel moves, except for the films."""
+        """True if the water is at rest as long as no vessel moves."""
         if self.water.parcels or any(vessel.velocity != NO_VELOCITY for vessel in self.motions):
             return False
         return all(

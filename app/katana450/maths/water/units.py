@@ -5,9 +5,9 @@ from __future__ import annotations
 GRAVITY = 9.81
 """Gravity [m/s^2]."""
 
-DENSITY, VISCOSITY, SURFACE_TENSION = 998.2, 1.0016e-3, 72.74e-3
-"""Density [kg/m^3], dynamic viscosity [Pa s] and surface tension against air [N/m] of water, by the
-International Association for the Properties of Water and Steam: releases R6-95, R12-08 and R1-76.
+DENSITY, VISCOSITY = 998.2, 1.0016e-3
+"""Density [kg/m^3] and dynamic viscosity [Pa s] of water, by the International Association for the
+Properties of Water and Steam: releases R6-95 and R12-08.
 """
 
 FEMTOLITRE = 1e-18
@@ -17,9 +17,6 @@ water. A basin holds 2e15 of them, which a float still represents exactly.
 
 ML = 1e-6
 """A millilitre [m^3], the unit that is displayed."""
-
-REST_FLOW = 1e-9
-"""Flow [m^3/s] below which water is taken as at rest: 3.6 ml in an hour."""
 
 MILLILITRE = 1_000_000_000_000
 """A millilitre [fl], the unit that is counted."""

@@ -153,18 +153,16 @@ class Water(msgspec.Struct, frozen=True, kw_only=True):
     """Water by its place.
 
     Attributes:
-        cup_ml: Volume in the cup, without the film on its wall [ml].
-        film_ml: Volume of the film on the wall of the cup [ml].
+        cup_ml: Volume in the cup [ml].
         basin_ml: Volume in the basin [ml].
         air_ml: Volume in free flight [ml].
         spilled_ml: Volume elsewhere [ml].
-        vessels_ml: Volume in each other vessel, with its film, by its name [ml].
+        vessels_ml: Volume in each other vessel by its name [ml].
         margin_to_rim: Height of the lip of the vessel in the hand, or of the cup, above its water
             [m]; negative while water flows out.
     """
 
     cup_ml: float
-    film_ml: float
     basin_ml: float
     air_ml: float
     spilled_ml: float

@@ -215,11 +215,10 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
     water = now.poured.water
     return answers.Water(
         cup_ml=water.cup.volume / MILLILITRE,
-        film_ml=water.cup.film / MILLILITRE,
         basin_ml=water.basin / MILLILITRE,
         air_ml=water.air / MILLILITRE,
         spilled_ml=water.spilled / MILLILITRE,
-        vessels_ml={vessel.name: vessel.kept / MILLILITRE for vessel in water.others},
+        vessels_ml={vessel.name: vessel.volume / MILLILITRE for vessel in water.others},
         margin_to_rim=pouring.margin_to_rim(now.poured, now.objects),
     )
 

@@ -377,7 +377,7 @@ class LooseObjects:
         water = None if state.poured is None else state.poured.water.vessel(scene_object.name)
         if water is None:
             return mass
-        return mass + MASS_STEP * round(water.kept * FEMTOLITRE * WATER_DENSITY / MASS_STEP)
+        return mass + MASS_STEP * round(water.volume * FEMTOLITRE * WATER_DENSITY / MASS_STEP)
 
     def _vessel(self, scene_object: SceneObject) -> Cup | Basin | None:
         """Return the form of a vessel; None for other objects, and where there is no water."""

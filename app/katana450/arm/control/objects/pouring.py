@@ -9,7 +9,7 @@ import numpy as np
 
 from katana450.arm.control.objects.environment import Environment
 from katana450.arm.control.state.scene_objects import SceneObject, Shape, named
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.environment import Cup, WaterEnvironment
 from katana450.maths.water.flow import (
     Course,
@@ -30,11 +30,6 @@ MAX_VESSELS = 8
 
 ABSENT_BASIN_AT = (100.0, 0.0, 0.0)
 """[m] Place of the basin if the scene has none: so far away that it catches no water."""
-
-FILM_STEP = 1.0
-"""[s] Time step of a film that drains in vessels at rest, because each step is published. The film
-differs by less than 0.5 % from that of short steps, and the sum of the volumes is exact.
-"""
 
 
 def is_vessel(scene_object: SceneObject) -> bool:
@@ -85,10 +80,9 @@ class Pouring:
 
         ``volumes``: volumes [fl] by the names of vessels; others keep what they have.
         """
-        volume_of = {vessel.name: vessel.kept for vessel in water.vessels} | dict(volumes)
+        volume_of = {vessel.name: vessel.volume for vessel in water.vessels} | dict(volumes)
         vessels = tuple(
-            self._rest(vessel, objects, x, volume_of.get(vessel.name, 0))
-            for vessel in vessels_of(objects)
+            self._rest(vessel, x, volume_of.get(vessel.name, 0)) for vessel in vessels_of(objects)
         )
         if not vessels:
             return None
@@ -108,8 +102,7 @@ class Pouring:
         A slip in the hand since the ``last`` objects does not accelerate the water: the state shows
         it in steps.
 
-        Returns ``poured`` itself while vessels and water are at rest; None if there is no cup. The
-        film in vessels at rest drains in steps of FILM_STEP; in between, the water stays the same.
+        Returns ``poured`` itself while vessels and water are at rest; None if there is no cup.
         """
         vessels = vessels_of(objects)
         if not vessels:
@@ -121,17 +114,8 @@ class Pouring:
         rests = [
             bool((vessel.T == T).all()) for vessel, T in zip(water.vessels, poses, strict=True)
         ]
-        still = all(rests) and poured.still
-        if dt <= 0.0 or (still and all(map(flow.film_rests, water.vessels))):
+        if dt <= 0.0 or (all(rests) and poured.still):
             return poured
-        if (
-            still
-            and poured.waited + dt < FILM_STEP
-            and all(flow.margin_to_rim(vessel) > 0.0 for vessel in water.vessels)
-        ):
-            return replace(poured, waited=poured.waited + dt)
-        if poured.waited:
-            water = flow.step(water, {}, poured.waited)
         motions = list(zip(vessels, poured.motions, poses, strict=True))
         if any(
             not rest and not vessel.carried for rest, vessel in zip(rests, vessels, strict=True)
@@ -184,20 +168,15 @@ class Pouring:
         )
         waters, motions = [], []
         for scene_object in vessels_of(objects):
-            vessel = poured.water.vessel(scene_object.name) or self._rest(
-                scene_object, objects, x, 0
-            )
+            vessel = poured.water.vessel(scene_object.name) or self._rest(scene_object, x, 0)
             waters.append(vessel)
             still = VesselMotion(Course(), self._middle(scene_object, vessel.T, objects))
             motions.append(known.get(scene_object.name) or still)
         water = replace(poured.water, vessels=tuple(waters))
         return replace(poured, water=water, motions=tuple(motions))
 
-    def _rest(
-        self, vessel: SceneObject, objects: Sequence[SceneObject], x: FloatArray, volume: int
-    ) -> VesselWater:
-        T = self._environment.pose(vessel, x)
-        return self._flow(objects).rest(vessel.name, volume, T)
+    def _rest(self, vessel: SceneObject, x: FloatArray, volume: int) -> VesselWater:
+        return VesselWater(vessel.name, volume, frozen(self._environment.pose(vessel, x)))
 
     def _shape(self, vessel: SceneObject) -> Cup:
         cup = self._water_environment.cup

@@ -42,7 +42,7 @@ class Situation:
             (state.gripper_setpoint, state.grip),
             state.tool,
             tuple(map(_shape, state.objects)),
-            None if water is None else tuple(vessel.kept for vessel in water.vessels),
+            None if water is None else tuple(vessel.volume for vessel in water.vessels),
         )
 
     @property

@@ -115,7 +115,6 @@ def water_measures(water: Water, course: Course) -> dict[str, float]:
     total = water.total
     return {
         "emptied_percent": 100.0 * water.basin / total if total else math.nan,
-        "emptied_ml": water.basin / MILLILITRE,
         "spilled_ml": water.spilled / MILLILITRE,
         "cup_peak_jerk_m_s3": course.peak_jerk,
     }

@@ -334,7 +334,7 @@ class SceneDraft(Declared):
             if name not in expected:
                 return f"there is also {name}"
         wanted, poured = (self.water or 0.0) / ML, state.poured
-        cup = 0.0 if poured is None else poured.water.cup.kept / MILLILITRE
+        cup = 0.0 if poured is None else poured.water.cup.volume / MILLILITRE
         if abs(wanted - cup) > SAME_VOLUME:
             return f"the cup has {cup:.1f} ml of water, not {wanted:.1f} ml of water"
         return ""

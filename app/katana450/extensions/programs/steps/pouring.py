@@ -38,7 +38,6 @@ from katana450.maths.water.flow import (
     VesselWater,
     Water,
     weir_flow,
-    withdrawn_thickness,
 )
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY, MILLILITRE, ML, counted
 
@@ -81,19 +80,6 @@ def spill_tilt(cup: Cylinder, volume: float) -> float:
         return math.atan2(max(rise, 0.0), cup.radius)
     low = math.atan2(0.5 * cup.depth, cup.radius)
     return _first_tilt(low, 0.5 * math.pi, lambda tilt: cup.holds(tilt) <= volume)[0]
-
-
-def film_after(poured: float, rest: float, time: float, cup: Cylinder) -> float:
-    """Return the volume [m^3] of the film when ``poured`` [m^3] has flowed out in ``time`` [s].
-
-    ``rest`` [m^3] stays in the cup. The surface falls evenly from that of the upright cup to that
-    at the tilt that holds the rest.
-    """
-    full = cup.wetted(0.0, (poured + rest) / (math.pi * cup.radius**2))
-    tilt = spill_tilt(cup, rest)
-    bared = max(full - cup.wetted(tilt, cup.level(tilt, rest)), 0.0)
-    speed = bared / (math.tau * cup.radius * time)
-    return 2.0 / 3.0 * bared * withdrawn_thickness(speed, GRAVITY)
 
 
 EMPTY_TILT: Final = math.radians(120.0)
@@ -320,7 +306,7 @@ class Drain(Action):
 
     Attributes:
         vessel: name of the vessel.
-        rest: volume that stays in it with its film [fl]; None to wait until the flow ends.
+        rest: volume that stays in it [fl]; None to wait until the flow ends.
     """
 
     vessel: str
@@ -336,9 +322,9 @@ class Drain(Action):
         if self.rest is None:
             return outflow(state.poured.water) < END_FLOW or waited > MAX_DRAIN
         if waited > MAX_DRAIN:
-            left = (water.kept - self.rest) * FEMTOLITRE / ML
+            left = (water.volume - self.rest) * FEMTOLITRE / ML
             raise InputError(f"After {MAX_DRAIN:g} s, {left:.1f} ml have still to be poured.")
-        return water.kept <= self.rest
+        return water.volume <= self.rest
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
         """Return the fraction of the maximum time that has passed."""
@@ -373,9 +359,6 @@ PART_FLOW = 0.5 * ML
 
 REACTION_TIME = 0.25
 """[s] Time in which a cup that turns back still pours at the same flow."""
-
-PART_TIME = 10.0
-"""[s] Duration of the pour of a part, for an estimate of the film on the wall."""
 
 SHAKES = 3
 """Number of shakes after all is poured, unless given."""
@@ -437,15 +420,15 @@ class Pour(Step, word="pour", example="basin"):
         pouring = plan.plan_context.session.pouring
         other = poured.water.vessel(self.into)
         if pouring is not None and other is not None:
-            part = water.kept - counted(rest)
+            part = water.volume - counted(rest)
             inside = pouring.water_environment(plan.state.objects).vessels[self.into].inside
-            room = counted(inside.capacity) - other.kept
+            room = counted(inside.capacity) - other.volume
             if part > room:
                 raise InputError(
                     f"{self.into} has room for {room / MILLILITRE:.1f} ml, which is less than the "
                     f"{part / MILLILITRE:.1f} ml to pour; give a smaller `ml`."
                 )
-            volumes[self.into] = other.kept + part
+            volumes[self.into] = other.volume + part
         level = plan.target
         if level.is_pitched and level.pitch > MAX_POUR_PITCH:
             raise InputError(
@@ -475,9 +458,9 @@ class Pour(Step, word="pour", example="basin"):
         """Return the volume [m^3] that stays in it. Raises InputError for too little water."""
         if self.volume is None:
             return 0.0
-        held = water.kept * FEMTOLITRE
+        held = water.volume * FEMTOLITRE
         # The water is counted in whole femtolitres.
-        if counted(self.volume) > water.kept:
+        if counted(self.volume) > water.volume:
             raise InputError(
                 f"The {vessel.name} holds {held / ML:.1f} ml at this step, which is less than "
                 f"{self.volume / ML:g} ml."
@@ -493,8 +476,7 @@ class Pour(Step, word="pour", example="basin"):
         if self.volume is None or pouring is None:
             return None
         inside = pouring.water_environment(plan.state.objects).vessels[vessel.name].inside
-        film = film_after(self.volume, rest, PART_TIME, inside)
-        return float(tilt_for(PART_FLOW, rest - film, inside))
+        return float(tilt_for(PART_FLOW, rest, inside))
 
     def _turned(
         self,
