@@ -117,7 +117,7 @@ raises `RefusedError`, whose text has the reason and what to do. `arm.stop()` se
 once and returns `confirmed` or `requested`. `arm.clear_stop()` waits until the stop can be cleared. If the
 server does not answer, a call raises `LostError`.
 
-With the token of an admin, `arm.people()` lists everybody who is connected, and `arm.kick(person)`
+With the token of an admin, `arm.list_people()` lists everybody who is connected, and `arm.kick(person)`
 disconnects one of them ([access](access.md#admins)).
 
 Questions cost processor time, of which each person has a [budget](access.md#limits). A question beyond

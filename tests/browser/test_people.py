@@ -17,6 +17,7 @@ from katana450.client.files import LostError
 from katana450.server.api import answers, requests
 from tests.browser.camera import Drawing
 from tests.browser.conftest import Windows
+from tests.gateway.client import people_of
 from tests.gateway.site import Site, open_site
 
 
@@ -108,7 +109,7 @@ def test_disconnected_person_still_stops_the_arm_and_comes_back(
         phone.set_viewport_size({"width": 390, "height": 844})
         # Only admins have the button of the list.
         assert phone.locator("#people-help").is_hidden()
-        (kai,) = (person for person in guard.people() if person.name == "Kai")
+        (kai,) = (person for person in people_of(guard) if person.name == "Kai")
         for again in (False, True):
             guard.kick(kai.person, 600.0)
             phone.get_by_text("An admin has disconnected you. Come back in").wait_for()

@@ -104,7 +104,7 @@ def broken(data: bytes, rng: random.Random) -> bytes:
 
 
 def json_mutant(rng: random.Random) -> bytes:
-    """Return a broken request that is neither a valid STOP nor two lines."""
+    """Return a broken request that is no valid STOP."""
     message = rng.choice(JSON)
     for _ in range(rng.randint(1, 3)):
         message = changed(message, rng, NASTY)

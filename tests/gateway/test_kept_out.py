@@ -19,7 +19,7 @@ from katana450.server.service.participants import MAX_NAME, MAX_PAGES, actor_of,
 from katana450.server.service.people import Connection
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.authenticator import KICKED
-from tests.gateway.client import HOUR
+from tests.gateway.client import HOUR, people_of
 from tests.gateway.test_hub import PAGES, Table
 from tests.gateway.virtual import VirtualServer
 
@@ -51,7 +51,7 @@ async def test_request_whose_sender_is_removed_before_its_end_is_refused(
 def test_http_programs_without_links_are_kept_out_together(local: VirtualServer) -> None:
     assert local.post(do="acquire")[0] == 200
     with local.connect("Ada") as ada:
-        (person,) = (entry.person for entry in ada.people() if entry.drives)
+        (person,) = (entry.person for entry in people_of(ada) if entry.drives)
         ada.kick(person, 60.0)
         status, refused = local.post("another-program-there", do="heartbeat")
         assert (status, KICKED in refused["why"]) == (403, True)

@@ -15,6 +15,7 @@ import pytest
 from katana450.client import Client, RefusedError
 from katana450.maths.geometry import se3
 from katana450.server.api import answers, requests
+from tests.gateway.client import people_of
 from tests.gateway.postures import READY, THERE
 from tests.gateway.virtual import VirtualServer
 from tests.waiting import state_when
@@ -200,7 +201,7 @@ def test_admin_who_takes_the_lease_ends_the_wait(local: VirtualServer, watcher: 
 
 def test_disconnected_program_is_stopped(local: VirtualServer, watcher: Client) -> None:
     with moving(local, watcher) as answer:
-        (person,) = (entry.person for entry in watcher.people() if entry.drives)
+        (person,) = (entry.person for entry in people_of(watcher) if entry.drives)
         watcher.kick(person, 60.0)
     watcher.kick(person, 0.0)
     status, refused = answer()

@@ -331,12 +331,6 @@ class AsyncClient(
         path = f"{ROOT}/recording?{urlencode({'last': last})}"
         return await asyncio.to_thread(self._site.fetched, path)
 
-    async def people(self) -> tuple[answers.ConnectedPerson, ...]:
-        """Return everybody who is connected or kept out. For admins only."""
-        answer = await self.ask(requests.ListPeople())
-        assert isinstance(answer, answers.People)
-        return answer.people
-
     async def _heartbeat(self) -> None:
         while True:
             await self.send(requests.Heartbeat())
@@ -488,7 +482,6 @@ class Client(Acts[answers.State, answers.Answer, None]):
     send_script = _blocking(AsyncClient.send_script)
     run = _blocking(AsyncClient.run)
     recording = _blocking(AsyncClient.recording)
-    people = _blocking(AsyncClient.people)
 
     def query(self, kind: type[A]) -> A:
         """See ``AsyncClient.query``."""

@@ -1,9 +1,8 @@
 """Server of STOP alone, in a process that shares nothing with the web server.
 
-It accepts ``POST /stop`` of pages, ``POST /api/v1/stop`` of programs, ``hello`` and ``stop`` as two
-JSON lines, and ``GET /health``. Each connection carries one request. STOP is passed to the arm's
-process at once. The only file that it needs is the access file: each STOP does a ``stat`` of it,
-and reads it after a change.
+It accepts ``POST /stop`` of pages, ``POST /api/v1/stop`` of programs, and ``GET /health``. Each
+connection carries one request. STOP is passed to the arm's process at once. The only file that it
+needs is the access file: each STOP does a ``stat`` of it, and reads it after a change.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import json
 import logging
 import secrets
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import nullcontext
 from http import HTTPStatus
 from typing import NamedTuple, cast
@@ -26,15 +25,12 @@ from katana450.arm.control.lease import Actor, CommandChannel, Grounds, Person
 from katana450.arm.control.state.stop_cause import UNNAMED, StopCause, pressed
 from katana450.arm.runtime.pipes.stop_messages import NO_STATE, StopPress
 from katana450.arm.runtime.pipes.stop_pipe import StopPipe
-from katana450.errors import InputError
 from katana450.server.api.fields import API, MAX_PRESS_LENGTH, STOP_PATHS
 from katana450.server.api.outcome_answers import Refused
-from katana450.server.api.stop_requests import Hello, Stop
 from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.limits import SenderBuckets
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import (
-    TOKEN_REQUIRED,
     UNKNOWN_HOST,
     Address,
     Authenticator,
@@ -61,7 +57,7 @@ MAX_KEPT = 32
 """Maximum number of connections that wait for a confirmation and are not closed for others."""
 
 MAX_HEAD_BYTES = 8192
-"""Maximum size of a request without its body, or of both lines [bytes]."""
+"""Maximum size of a request without its body [bytes]."""
 
 LINGER = 0.5
 """[s] Time in which the body of an answered request is received, and dropped."""
@@ -73,8 +69,6 @@ HEADERS = (
     ("x-content-type-options", "nosniff"),
 )
 """Headers of every answer."""
-
-LINES_HELP = 'Send {"do": "hello", "name": "..."} and {"do": "stop"}, each on a line of its own.'
 
 
 class Reply(NamedTuple):
@@ -136,22 +130,6 @@ class StopServer:
         page = parameters.get("page", "") if path == STOP_PATHS[0] else ""
         channel = CommandChannel.PAGE if path == STOP_PATHS[0] else CommandChannel.HTTP
         return _readable_by(origin, await self._stop(identity, channel, press, client, page))
-
-    async def reply_to_lines(self, lines: Sequence[bytes], client: tuple[str, int] | None) -> Reply:
-        """Execute a ``hello`` and a ``stop``, the two ``lines`` of ``client``."""
-        try:
-            if len(lines) < 2:
-                raise InputError("one of them is too long")
-            hello = msgspec.json.decode(lines[0], type=Hello)
-            stop = msgspec.json.decode(lines[1], type=Stop)
-        except (InputError, msgspec.DecodeError, UnicodeDecodeError) as error:
-            why = f"The two lines cannot be read: {str(error).rstrip('.')}. {LINES_HELP}"
-            return await self.delayed(_refused_line(why), client)
-        token = f"Bearer {hello.token}"
-        identity = self._authenticator.program(hello.name, token, {}, stopping=True)
-        if identity is None:
-            return await self.delayed(_refused_line(TOKEN_REQUIRED), client)
-        return await self._stop(identity, CommandChannel.TCP, stop.press or "", client)
 
     async def delayed(self, reply: Reply, client: tuple[str, int] | None) -> Reply:
         """Return the refusal ``reply``, after ``DELAY`` if ``client`` gets too many."""
@@ -279,11 +257,6 @@ def _answer(stage: str, why: str) -> Reply:
     )
 
 
-def _refused_line(why: str) -> Reply:
-    body = json.dumps({"stop": "refused", "why": why}).encode() + b"\n"
-    return Reply(HTTPStatus.BAD_REQUEST, body, "application/json")
-
-
 def _address_of(client: tuple[str, int] | None) -> str:
     return "" if client is None else client[0]
 
@@ -306,7 +279,6 @@ class StopConnection(asyncio.Protocol):
     def __init__(self, server: StopServer) -> None:
         self._server = server
         self._http = h11.Connection(h11.SERVER, max_incomplete_event_size=MAX_HEAD_BYTES)
-        self._lines = bytearray()
         self._task: asyncio.Task[None] | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -316,9 +288,6 @@ class StopConnection(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Handle the request once it is whole."""
         if self._task is not None:
-            return
-        if self._lines or (self._http.their_state is h11.IDLE and data.startswith(b"{")):
-            self._receive_lines(data)
             return
         try:
             self._http.receive_data(data)
@@ -331,27 +300,8 @@ class StopConnection(asyncio.Protocol):
             self._task = asyncio.create_task(self._handle(event))
 
     def eof_received(self) -> bool:
-        """Count a last line without its line feed; return whether an answer is still to come."""
-        if self._lines and self._task is None:
-            self._receive_lines(b"\n")
+        """Return whether an answer is still to come."""
         return self._task is not None
-
-    def _receive_lines(self, data: bytes) -> None:
-        """Receive JSON lines; no request of a browser begins with a brace."""
-        self._lines += data
-        lines = bytes(self._lines).split(b"\n", 2)
-        if len(lines) > 2 or len(self._lines) > MAX_HEAD_BYTES:
-            self._task = asyncio.create_task(self._handle_lines(lines))
-
-    async def _handle_lines(self, lines: list[bytes]) -> None:
-        try:
-            body = (await self._server.reply_to_lines(lines, self._client)).body
-        except Exception:
-            log.exception("Two lines on the port of STOP met an error.")
-            body = b'{"stop": "refused", "why": "See the log of the server."}\n'
-        if not self._transport.is_closing():
-            self._transport.write(body)
-        self._transport.close()
 
     @property
     def _client(self) -> tuple[str, int] | None:
