@@ -136,7 +136,8 @@ def test_cup_falls_from_a_weak_grip_with_a_reason(
     assert Reason.SLIPPED not in {finding.reason for finding in opened.findings}
 
 
-@pytest.mark.parametrize("name", ["SO-101", pytest.param("Robotiq 2F-85", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["SO-101", "Robotiq 2F-85"])
 def test_both_sides_of_another_hand_press_on_a_box(name: str, tmp_path: Path) -> None:
     kind = KINDS[name]
     box = item("part", "box", kind.box, kind.at, 17.0)

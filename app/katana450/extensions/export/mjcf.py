@@ -11,15 +11,18 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
+from katana450.arm.control.objects.loose_objects import Grasping
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.link import Inertial, Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import PrimitiveShape, Visual
+from katana450.assembly.robot_session import arm_session
 from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
 from katana450.extensions.export.files import distinct, zipped
 from katana450.extensions.export.obj_text import obj_text
@@ -27,6 +30,7 @@ from katana450.maths.collision.linkage import Linkage
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.physics import model as physics
 from katana450.settings import Settings
 
 GRAVITY = 9.81
@@ -76,6 +80,40 @@ class Drive:
     max_force: float
 
 
+class HandDrive(NamedTuple):
+    """The hand as the app simulates it.
+
+    Attributes:
+        links: names of the links that hold: the fingers, and those of the palm.
+        joints: names of the driven finger joints.
+        stiffness, force: stiffness of the drive of each of them, and its greatest force
+            [N m/rad or N/m, N m or N].
+    """
+
+    links: frozenset[str]
+    joints: tuple[str, ...]
+    stiffness: float
+    force: float
+
+
+def grip_of(robot: Robot) -> HandDrive | None:
+    """Return the hand of ``robot``; None without one that holds objects."""
+    if robot.arm is None:
+        return None
+    environment = arm_session(Settings(), robot).session.environment
+    grasping, world = Grasping.of(environment), environment.bodies
+    if grasping is None or world is None:
+        return None
+    drive, variable = grasping.drive, world.linkage.variable
+    links = frozenset(
+        part.name
+        for part in world.parts
+        if part.mover == drive.palm or variable[part.mover] == drive.variable
+    )
+    joints = tuple(name for name in robot.driven if name in robot.arm.fingers)
+    return HandDrive(links, joints, drive.stiffness / len(joints), drive.force_limit / len(joints))
+
+
 def is_frame(robot: Robot, link: Link) -> bool:
     """Return whether ``link`` is only a frame: fixed, without mass, shape and children."""
     return not (
@@ -88,8 +126,8 @@ def is_frame(robot: Robot, link: Link) -> bool:
     )
 
 
-def drives_of(robot: Robot) -> dict[str, Drive]:
-    """Return a drive for each movable joint of ``robot``."""
+def drives_of(robot: Robot, grip: HandDrive | None) -> dict[str, Drive]:
+    """Return a drive for each movable joint of ``robot``, for the fingers that of ``grip``."""
     carried = {joint.name: _carried(robot, link, joint) for link, joint in moved_links(robot)}
     drives: dict[str, Drive] = {}
     for _, joint in moved_links(robot):
@@ -102,9 +140,14 @@ def drives_of(robot: Robot) -> dict[str, Drive]:
         load = max(sum(factor * weight for factor, weight, _ in moved), MIN_LOAD)
         inertia = sum(factor * factor * mass for factor, _, mass in moved)
         stiffness = load / SAG
-        armature = max(INERTIA_RATIO * inertia, stiffness / MAX_FREQUENCY**2 - inertia)
         is_credible = CREDIBLE_RATIO * load <= joint.effort < np.inf
         force = joint.effort if is_credible else FORCE_RATIO * load
+        armature = INERTIA_RATIO * inertia
+        if grip is not None and joint.leader in grip.joints:
+            stiffness, force = max(stiffness, grip.stiffness), grip.force
+            # A light finger would be pressed into what it holds.
+            armature = physics.FINGER_MASS if joint.slides else physics.FINGER_INERTIA
+        armature = max(armature, stiffness / MAX_FREQUENCY**2 - inertia)
         spring = DAMPING_RATIO * 2.0 * float(np.sqrt(stiffness * (inertia + armature)))
         drives[joint.name] = Drive(
             stiffness, armature, joint.damping or spring, joint.friction, force
@@ -194,8 +237,26 @@ def excluded_pairs(robot: Robot) -> list[tuple[str, str]]:
 WORLD = "world"
 """Name that MuJoCo keeps for its own root."""
 
-TIMESTEP = 0.001
-"""[s] Step of the simulation, small enough for the drives of the lightest links."""
+OPTION = {
+    "integrator": "implicitfast",
+    "timestep": repr(physics.STEP),
+    "cone": "elliptic",
+    "noslip_iterations": str(physics.SLIP_STEPS),
+}
+"""Attributes of the simulation. The step is small enough for the drives of the lightest links."""
+
+CONTACT = {
+    "solref": f"{physics.CONTACT_TIME!r} {physics.CONTACT_DAMPING!r}",
+    "solimp": " ".join(map(repr, physics.CONTACT_STIFFNESS)),
+}
+"""Attributes of contacts, which are as hard as the app simulates them."""
+
+HAND = "hand"
+"""Name of the class of geometries that hold objects."""
+
+LINK_FRICTION = physics.LINK_FRICTION, physics.SPIN_FRICTION, physics.ROLLING_FRICTION
+HAND_FRICTION = physics.PAD_FRICTION, physics.PAD_SPIN, physics.ROLLING_FRICTION
+"""[1, m, m] Friction of links and of what holds: against sliding, spinning and rolling."""
 
 LEAST_MASS, LEAST_INERTIA = "1e-4", "1e-8"
 """[kg, kg m^2] Minimum of a moving body, for robots whose file states no masses."""
@@ -203,7 +264,7 @@ LEAST_MASS, LEAST_INERTIA = "1e-4", "1e-8"
 SITE_RADIUS = "0.004"
 """[m] Radius with which a frame is drawn."""
 
-COUPLING = {"solref": "0.004 1", "solimp": "0.99 0.999 0.0001"}
+COUPLING = {"solref": "0.004 1", "solimp": CONTACT["solimp"]}
 """Attributes of a stiff equality; its time constant [s] is a few steps."""
 
 VISUAL = {"type": "mesh", "group": "2", "contype": "0", "conaffinity": "0", "mass": "0"}
@@ -248,7 +309,8 @@ class _Model:
     def __init__(self, robot: Robot) -> None:
         self.meshes: dict[str, str] = {}
         self._robot = robot
-        self._drives = drives_of(robot)
+        self._grip = grip_of(robot)
+        self._drives = drives_of(robot, self._grip)
         self._assets = ET.Element("asset")
         shown = dict.fromkeys(shape.material for link in robot.links for shape in link.shapes)
         names = distinct(material.name for material in shown)
@@ -268,7 +330,11 @@ class _Model:
             boundmass=LEAST_MASS,
             boundinertia=LEAST_INERTIA,
         )
-        ET.SubElement(root, "option", integrator="implicitfast", timestep=repr(TIMESTEP))
+        ET.SubElement(root, "option", OPTION)
+        defaults = ET.SubElement(root, "default")
+        ET.SubElement(defaults, "geom", {"friction": _numbers(LINK_FRICTION), **CONTACT})
+        holds = ET.SubElement(defaults, "default", {"class": HAND})
+        ET.SubElement(holds, "geom", friction=_numbers(HAND_FRICTION), condim="4")
         root.append(self._assets)
         for material, name in self._materials.items():
             ET.SubElement(
@@ -312,6 +378,8 @@ class _Model:
     def _collision(self, link: Link, collision: Visual) -> ET.Element:
         """Return the geometry of a collision shape."""
         geom = ET.Element("geom", group="3", mass="0")
+        if self._grip is not None and link.name in self._grip.links:
+            geom.set("class", HAND)
         size = None if collision.primitive is None else _primitive(collision.primitive)
         if size is not None:
             geom.attrib.update(size, **_place(collision.T_body_visual))
