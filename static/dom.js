@@ -10,8 +10,21 @@ export function element(id, kind) {
   return match;
 }
 
+/** @param {string} id */
+export const byId = (id) => element(id, HTMLElement);
+
 /** Call `act` for each click on the element with an id. @param {string} id @param {() => void} act */
-export const onClick = (id, act) => element(id, HTMLElement).addEventListener("click", act);
+export const onClick = (id, act) => byId(id).addEventListener("click", act);
+
+/** Call `use` with the files that a person chooses in a box. @param {HTMLInputElement} input @param {(list: File[]) => void} use */
+export function onChoice(input, use) {
+  input.addEventListener("change", () => {
+    const list = [...(input.files ?? [])];
+    // Cleared, so that the same file can be chosen again.
+    input.value = "";
+    if (list.length) use(list);
+  });
+}
 
 // Return the first element in `root` that a selector matches. Throws an error if it is missing or of another kind.
 /** @template {Element} T @param {string} selector @param {new () => T} kind @param {ParentNode} root @returns {T} */
@@ -21,13 +34,15 @@ export function first(selector, kind, root = document) {
   return match;
 }
 
+/** Return `words` in the language of the page. @param {string} words */
+export const t = (words) => window.translated?.(words) ?? words;
+
 /** Write only changes: a text that is written again is read aloud again. @param {Element} target @param {string} words */
 export function write(target, words) {
-  if (target.textContent !== words) target.textContent = words;
+  if (target.textContent !== t(words)) target.textContent = t(words);
 }
 
-// Return what viser's page in `frame` offers: nothing before its scripts have run, or if it could not be loaded.
-/** @param {HTMLIFrameElement} frame */
+/** Return what viser's page in `frame` offers: nothing before its scripts have run, or if it could not be loaded. @param {HTMLIFrameElement} frame */
 export const sceneOf = (frame) => (frame.contentDocument ? frame.contentWindow?.katanaScene : undefined);
 
 /** The same for a page whose scene is drawn. Throws an error for another. @param {HTMLIFrameElement} frame */
@@ -47,8 +62,7 @@ export function save(content, name) {
 // The present second of the clock on the wall, as a part of the name of a file.
 export const timestamp = () => new Date().toLocaleString("sv").replace(" ", "T").replaceAll(":", "-");
 
-// Load the style beside a module, whose address is `url`; resolved when it is there or cannot be loaded.
-/** @param {string} name @param {string} url */
+/** Load the style beside a module, whose address is `url`; resolved when it is there or cannot be loaded. @param {string} name @param {string} url */
 export function styled(name, url) {
   const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href: new URL(name, url).href });
   document.head.append(link);

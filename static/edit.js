@@ -1,5 +1,5 @@
 // Direct changes to the scene: a dropped file, Delete, undo and redo.
-import { closest, element, matches } from "./dom.js";
+import { closest, element, matches, t } from "./dom.js";
 import * as Objects from "./objects.js";
 
 /** @typedef {"undo" | "redo"} Step */
@@ -10,7 +10,7 @@ let page;
 let parts;
 /**
  * What a change needs of the parts of the page that are loaded later.
- * @typedef {{ stage: import("./scene/stage.js").Stage | null, replay: (file: File) => void }} Parts
+ * @typedef {Pick<import("./page/parts.js").Parts, "stage" | "teach" | "replay">} Parts
  */
 /** @type {Record<Step, string[]>} */
 let changes = { undo: [], redo: [] }; // names of what can be undone and redone, the newest first
@@ -27,22 +27,25 @@ function step(what) {
 
 /** Return whether the key was handled. @param {KeyboardEvent} event */
 export function key(event) {
+  if (event.type !== "keydown" || event.altKey) return false;
   // The sheet of programs undoes its own changes.
-  if (event.type !== "keydown" || event.altKey || closest(event.target, "#teach")) return false;
+  const content = closest(event.target, "#teach") && parts.teach?.content;
   // The letter on the key, which is elsewhere on other keyboards; the place of the key if it has no such letter.
   const letter = (/^[a-z]$/i.test(event.key) ? event.key : event.code.slice(3)).toLowerCase();
   if ((letter === "z" || letter === "y") && (event.ctrlKey || event.metaKey)) {
-    if (!event.repeat) step(letter === "y" || event.shiftKey ? "redo" : "undo");
+    const what = letter === "y" || event.shiftKey ? "redo" : "undo";
+    if (content) content[what]();
+    else if (!event.repeat) step(what);
     return true;
   }
-  return !event.repeat && event.key === "Delete" && Boolean(parts.stage?.selection?.remove());
+  return !content && !event.repeat && event.key === "Delete" && Boolean(parts.stage?.selection?.remove());
 }
 
 /** @param {Page.Status} status */
 function note(status) {
   changes = { undo: status.undo ?? [], redo: status.redo ?? [] };
   revocations = status.revocations;
-  const names = changes.undo.length ? changes.undo : ["nothing yet"];
+  const names = (changes.undo.length ? changes.undo : ["nothing yet"]).map(t);
   const list = element("undoable", HTMLElement);
   if ([...list.children].map((entry) => entry.textContent).join() !== names.join())
     list.replaceChildren(...names.map((name) => Object.assign(document.createElement("li"), { textContent: name })));

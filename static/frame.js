@@ -87,14 +87,12 @@ for (const kind of ["pointerdown", "wheel"])
     { capture: true, passive: true },
   );
 
-// viser's own settings fold away slowly. They are shown again when a person asks for them.
-for (const kind of ["pointerdown", "keydown"])
-  window.addEventListener(kind, () => loaded && delete document.documentElement.dataset.loading, { capture: true });
-
 /** The hint of a control goes when the control is used, and may return when the pointer has left it. @type {Element | null} */
 let used = null;
 for (const kind of ["pointerdown", "keydown"])
   window.addEventListener(kind, ({ target }) => {
+    // viser's own settings fold away slowly. They are shown again when a person asks for them.
+    if (loaded) delete document.documentElement.dataset.loading;
     used = Viser.rowOf(target);
     document.documentElement.dataset.used = "";
   }, { capture: true });

@@ -1,6 +1,6 @@
 // Hold to move: keys, pads, gamepad and SpaceMouse, added up to five rates, six with a yaw, or seven with the elbow. An input that is released,
 // unplugged or in a hidden tab counts as zero, and without new messages the arm comes to rest.
-import { element, first, write } from "./dom.js";
+import { byId, first, write } from "./dom.js";
 import { messageOf } from "./server.js";
 
 /** @typedef {"plane" | "lift"} Pad */
@@ -19,8 +19,6 @@ const KEYS = {
 };
 
 const none = () => [0, 0, 0, 0, 0, 0, 0];
-/** @param {string} id */
-const byId = (id) => element(id, HTMLElement);
 /** @returns {NodeListOf<HTMLButtonElement>} */
 const holdButtons = () => document.querySelectorAll("[data-hold]");
 /** Codes of the keys that are held, and of those whose buttons are held. @type {Set<string>} */

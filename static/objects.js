@@ -1,5 +1,5 @@
 // Objects and scenes from files: the server reads a file, and the object is placed where it was dropped, or before the arm.
-import { element, save } from "./dom.js";
+import { byId, element, onChoice, save } from "./dom.js";
 import { button } from "./instruments/shape.js";
 import { chooseRobot } from "./more.js";
 
@@ -9,8 +9,6 @@ const ALONE = /\.(stl|ply|glb|3mf|zip)$/i; // what needs no other file
 const TOGETHER = "Files that belong together, such as a .gltf and its .bin, or a folder, are read from a .zip: put them into one.";
 const MAX_BYTES = 60e6; // of a file; the server accepts no more
 const TAIL = 200_000; // bytes at the end of a .zip file in which the names of its files are
-/** @param {string} id */
-const byId = (id) => element(id, HTMLElement);
 /** @type {Page.Say} */
 let say = () => {};
 const unit = element("unit", HTMLSelectElement);
@@ -104,17 +102,6 @@ async function saveScene() {
   report("Saved. scene.zip contains scene.yaml and the files of its objects.");
 }
 
-/** Call `use` with the files that a person chooses in the box with an id. @param {string} id @param {(list: File[]) => void} use */
-function onChoice(id, use) {
-  const input = element(id, HTMLInputElement);
-  input.addEventListener("change", () => {
-    const list = [...(input.files ?? [])];
-    // Cleared, so that the same file can be chosen again.
-    input.value = "";
-    if (list.length) use(list);
-  });
-}
-
 /** @param {Pick<Page.Context, "say">} page */
 export function begin(page) {
   say = page.say;
@@ -122,8 +109,8 @@ export function begin(page) {
   byId("load").addEventListener("click", () => byId("scene-file").click());
   byId("save").addEventListener("click", saveScene);
   unit.addEventListener("change", () => add(true));
-  onChoice("object-file", take);
-  onChoice("scene-file", ([first]) => load(first));
+  onChoice(element("object-file", HTMLInputElement), take);
+  onChoice(element("scene-file", HTMLInputElement), ([first]) => load(first));
 }
 
 /** @type {Promise<import("./objects/object.js").ObjectForm> | null} */

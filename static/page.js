@@ -1,5 +1,5 @@
 // The page around the scene: its connection to the server, and what its parts need of each other.
-import { element } from "./dom.js";
+import { element, onClick } from "./dom.js";
 import * as Edit from "./edit.js";
 import * as Jog from "./jog.js";
 import * as More from "./more.js";
@@ -88,8 +88,7 @@ function used() {
   send({ used: true });
 }
 
-// The parameters for viser's page, which loads meanwhile; resolved when the person has signed in.
-/** @type {(parameters: URLSearchParams) => void} */
+/** The parameters for viser's page, which loads meanwhile; resolved when the person has signed in. @type {(parameters: URLSearchParams) => void} */
 let enterScene = () => {};
 window.katana = {
   key, blur, used,
@@ -104,13 +103,15 @@ window.katana = {
 window.addEventListener("pagehide", () => navigator.sendBeacon(`leave?page=${page.name}`));
 
 // Below the bar and not modal, so that mouse and finger can press STOP.
-const [help, helpButton] = [element("help", HTMLDialogElement), element("help-button", HTMLButtonElement)];
-helpButton.addEventListener("click", () => {
-  if (help.open) return help.close();
-  help.show();
-  helpButton.setAttribute("aria-expanded", "true");
+const help = element("help", HTMLDialogElement);
+onClick("help-button", () => (help.open ? help.close() : help.show()));
+
+// The buttons of a dialog say whether it is open.
+const opened = new MutationObserver(([{ target }]) => {
+  const { id, open } = /** @type {HTMLDialogElement} */ (target);
+  for (const button of document.querySelectorAll(`[aria-controls=${id}]`)) button.setAttribute("aria-expanded", String(open));
 });
-help.addEventListener("close", () => helpButton.setAttribute("aria-expanded", "false"));
+for (const dialog of document.querySelectorAll("dialog")) opened.observe(dialog, { attributeFilter: ["open"] });
 
 // What is held when the stop is cleared must not move the arm, also where other people stopped and cleared it.
 let stopped = false;

@@ -11,8 +11,9 @@ export const messageOf = (error) => (error instanceof Error ? error.message : St
 export async function request(url, options) {
   const answer = await fetch(url, options).catch(() => null);
   if (!answer) throw new Error("The server does not answer.");
-  if (!answer.ok) throw new Error(await answer.text());
-  return answer;
+  if (answer.ok) return answer;
+  const words = await answer.text();
+  throw new Error(words.startsWith("{") ? JSON.parse(words).why : words);
 }
 
 /** Return the answer `arm`. Throws an error without one. @returns {Promise<Api.Arm>} */

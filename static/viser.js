@@ -249,8 +249,7 @@ export const viewing = ({ position, look_at, up_direction }) => [
 /** Return whether the server's whole scene has arrived with `messages`. @param {ViserPage.Message[]} messages */
 export const replayed = (messages) => messages.some(({ type }) => type === "ReplayDoneMessage");
 
-// Return whether `messages` contain controls of the panel, without which viser shows its own settings.
-/** @param {ViserPage.Message[]} messages */
+/** Return whether `messages` contain controls of the panel, without which viser shows its own settings. @param {ViserPage.Message[]} messages */
 export const controlsIn = (messages) => messages.some(({ type }) => /^Gui(?!Set|Update|Remove)/.test(type));
 
 // Change `messages` to a theme {dark, sky, properties of the floor}. Return the changed messages.

@@ -1,6 +1,7 @@
 // Episodes: REC, the judgement of attempts, and their list. Loaded when the server records.
 import { element, styled, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
+import { messageOf, request } from "../server.js";
 
 /** @typedef {Page.Outcome} Outcome */
 /** @typedef {"success" | "failure" | "discard" | "rerecord"} Act */
@@ -139,11 +140,11 @@ export class Episodes {
     if (act === "rec" && saving) return;
     // The episode that is seen: another person may have ended it, or judged another one.
     const seen = { number: running?.number ?? saving ?? before?.number };
-    const request =
+    const body =
       act === "rec" ? (running ? { do: "stop", ...seen } : { do: "start", task: this.#task.value })
       : isOutcome(act) ? { do: "judge", outcome: act, ...seen }
       : { do: act, ...seen };
-    const done = await this.#ask(request);
+    const done = await this.#ask(body);
     if (!done) return;
     // The next key may come before the next state.
     const { number, outcome, start, end, missing_ticks } = done;
@@ -155,16 +156,12 @@ export class Episodes {
     else if (act === "discard") this.toast(`${name} is discarded. The list restores it.`);
   }
 
-  // Send `request`; return the episode, or null after a refusal, which is shown.
-  /** @param {object} request @returns {Promise<Episode | null>} */
-  async #ask(request) {
+  /** Send `body`; return the episode, or null after a refusal, which is shown. @param {object} body @returns {Promise<Episode | null>} */
+  async #ask(body) {
     try {
-      const answer = await fetch(`api/v1/episodes?page=${this.page}`, { method: "POST", body: JSON.stringify(request) });
-      const words = await answer.text();
-      if (answer.ok) return JSON.parse(words);
-      this.toast(words.startsWith("{") ? JSON.parse(words).why : words);
-    } catch {
-      this.toast("No connection: nothing was changed.");
+      return await (await request(`api/v1/episodes?page=${this.page}`, { method: "POST", body: JSON.stringify(body) })).json();
+    } catch (error) {
+      this.toast(messageOf(error));
     }
     this.#listed = -1;
     this.#fill();
@@ -204,8 +201,8 @@ export class Episodes {
       input.addEventListener("change", () => change(input.value));
       return html("label", {}, label, input);
     };
-    /** @param {object} request */
-    const ask = (request) => this.#ask({ ...request, number });
+    /** @param {object} body */
+    const ask = (body) => this.#ask({ ...body, number });
     /** @param {number} value */
     const seconds = (value) => ({ type: "number", step: 0.1, min: 0, max: recorded.toFixed(1), value: value.toFixed(1) });
     const select = html("select", {}, ...Object.entries(OUTCOMES).slice(0, outcome === "unfinished" ? 4 : 3).map(([value, words]) => html("option", { value, ...(value === outcome && { selected: "" }) }, words)));

@@ -40,35 +40,15 @@ function knobs(arm, gripper, say) {
   const read = readings(arm);
   /** @param {number} value */
   const percent = (value) => `${signed(value, 0)} %`;
-  const joints = arm.joints.map((_, i) =>
-    made(
-      `axis-${i + 1}`,
-      arm.links[i].label,
-      {
-        low: arm.lower[i] * read[i].of,
-        high: arm.upper[i] * read[i].of,
-        step: 1,
-        full: 1,
-        text: (value) => `${signed(value, 1)}${read[i].mark}`,
-      },
-      (value) => ({ do: "joint", axis: i + 1, value: value / read[i].of }),
-      ({ goal, q }) => [goal[i] * read[i].of, q[i] * read[i].of],
-    ),
+  const joints = arm.joints.map((_, i) => {
+    const { of, mark } = read[i];
+    const options = { low: arm.lower[i] * of, high: arm.upper[i] * of, step: 1, full: 1, text: (/** @type {number} */ value) => `${signed(value, 1)}${mark}` };
+    return made(`axis-${i + 1}`, arm.links[i].label, options, (value) => ({ do: "joint", axis: i + 1, value: value / of }), ({ goal, q }) => [goal[i] * of, q[i] * of]);
+  });
+  const fingers = gripper && made("gripper", "Gripper", { low: 0, high: 100, step: 2, text: percent }, (value) => ({ do: "gripper", angle: gripper.angle(value) }), (state) =>
+    [gripper.percent(state.gripper_goal), gripper.percent(state.gripper)],
   );
-  const fingers = gripper && made(
-    "gripper",
-    "Gripper",
-    { low: 0, high: 100, step: 2, text: percent },
-    (value) => ({ do: "gripper", angle: gripper.angle(value) }),
-    (state) => [gripper.percent(state.gripper_goal), gripper.percent(state.gripper)],
-  );
-  const speed = made(
-    "speed",
-    "Speed",
-    { low: 5, high: 100, step: 5, text: percent },
-    (value) => ({ do: "speed", value: value / 100 }),
-    (state) => [state.speed * 100, state.speed * 100],
-  );
+  const speed = made("speed", "Speed", { low: 5, high: 100, step: 5, text: percent }, (value) => ({ do: "speed", value: value / 100 }), (state) => [state.speed * 100, state.speed * 100]);
   return [...joints, ...(fingers ? [fingers] : []), speed];
 }
 
@@ -87,6 +67,9 @@ function gauge(id, title, options, of) {
 /** @param {number} value */
 const one = (value) => signed(value, 1);
 
+/** Return the zones of a value that is bad below `bad`, and warns below `warn`. @param {number} bad @param {number} warn */
+const zonesBelow = (bad, warn) => [{ below: bad, tone: "bad" }, { below: warn, tone: "warn" }];
+
 /** @param {Api.Arm} arm @returns {Instrument[]} */
 function gauges(arm) {
   const read = readings(arm);
@@ -98,15 +81,11 @@ function gauges(arm) {
     id: "rates", title: "Joint speeds", size: "wide", shown: true, element: bars.element,
     draw: ({ qd }) => bars.show(qd.map((rate, i) => rate * read[i].of)),
   };
-  const late = gauge(
-    "late",
-    "Loop lateness",
-    {
-      low: 0, high: 5, unit: "ms, 99 %", text: (value) => signed(value, 2),
-      zones: [{ above: 4, tone: "bad" }, { above: 2, tone: "warn" }],
-    },
-    (_, loop) => (loop ? [loop.late_p99 * MS, `${loop.lost} lost`] : [null]),
-  );
+  const lateness = {
+    low: 0, high: 5, unit: "ms, 99 %", text: (/** @type {number} */ value) => signed(value, 2),
+    zones: [{ above: 4, tone: "bad" }, { above: 2, tone: "warn" }],
+  };
+  const late = gauge("late", "Loop lateness", lateness, (_, loop) => (loop ? [loop.late_p99 * MS, `${loop.lost} lost`] : [null]));
   // The other gauges need a tool, which a mechanism of joints does not have.
   if (arm.joints_only) return [rates, late];
   const [clearance, ...others] = toolGauges(arm);
@@ -115,55 +94,23 @@ function gauges(arm) {
 
 /** @param {Api.Arm} arm @returns {Instrument[]} */
 function toolGauges(arm) {
-  return [
-    gauge(
-      "clearance",
-      "Clearance",
-      {
-        low: 0, high: 100, unit: "mm", text: one,
-        zones: [{ below: 6, tone: "bad" }, { below: 20, tone: "warn" }],
-      },
-      ({ margins }) => {
-        const { clearance, parts } = margins ?? {};
-        return clearance != null && parts ? [clearance * MM, parts.map(spoken).join(" – ")] : [null, "not checked"];
-      },
+  const speed = { low: 0, high: 500, unit: "mm/s", text: (/** @type {number} */ value) => signed(value, 0), zones: [{ above: 450, tone: "warn" }] };
+  const singular = { low: 0, high: 0.5, unit: "smallest", text: (/** @type {number} */ value) => signed(value, 3), zones: zonesBelow(0.02, 0.05) };
+  const gauges = [
+    gauge("clearance", "Clearance", { low: 0, high: 100, unit: "mm", text: one, zones: zonesBelow(6, 20) }, ({ margins }) => {
+      const { clearance, parts } = margins ?? {};
+      return clearance != null && parts ? [clearance * MM, parts.map(spoken).join(" – ")] : [null, "not checked"];
+    }),
+    gauge("tool-speed", "Tool speed", speed, (state) => [(state.tool_speed ?? 0) * MM]),
+    gauge("limit", "To a limit", { low: 0, high: 90, unit: "°", text: one, zones: zonesBelow(2, 8) }, ({ margins }) =>
+      margins ? [margins.limit * DEGREES, `axis ${margins.axis}`] : [null],
     ),
-    gauge(
-      "tool-speed",
-      "Tool speed",
-      { low: 0, high: 500, unit: "mm/s", text: (value) => signed(value, 0), zones: [{ above: 450, tone: "warn" }] },
-      ({ tool_speed: speed }) => [(speed ?? 0) * MM],
-    ),
-    gauge(
-      "limit",
-      "To a limit",
-      {
-        low: 0, high: 90, unit: "°", text: one,
-        zones: [{ below: 2, tone: "bad" }, { below: 8, tone: "warn" }],
-      },
-      ({ margins }) => (margins ? [margins.limit * DEGREES, `axis ${margins.axis}`] : [null]),
-    ),
-    gauge(
-      "singular",
-      "Singular value",
-      {
-        low: 0, high: 0.5, unit: "smallest", text: (value) => signed(value, 3),
-        zones: [{ below: 0.02, tone: "bad" }, { below: 0.05, tone: "warn" }],
-      },
-      ({ margins }) => [margins?.smallest_singular_value ?? null],
-    ),
-    // Other arms have a rotation in place of a pitch.
-    ...(arm.freedoms === 5
-      ? [
-          gauge(
-            "pitch",
-            "Tool pitch",
-            { low: -180, high: 180, origin: 0, unit: "°, + is down", text: one },
-            ({ pitch }) => [(pitch ?? 0) * DEGREES],
-          ),
-        ]
-      : []),
+    gauge("singular", "Singular value", singular, ({ margins }) => [margins?.smallest_singular_value ?? null]),
   ];
+  // Other arms have a rotation in place of a pitch.
+  if (arm.freedoms !== 5) return gauges;
+  const pitch = { low: -180, high: 180, origin: 0, unit: "°, + is down", text: one };
+  return [...gauges, gauge("pitch", "Tool pitch", pitch, (state) => [(state.pitch ?? 0) * DEGREES])];
 }
 
 /** The greatest force of a finger, and what is held. @param {NonNullable<Api.State["touch"]>} touch */
@@ -185,7 +132,7 @@ function plots(arm, gripper, history, groups, view) {
   };
   const unit = [...new Set(readings(arm).map(({ mark }) => mark.trim()))].join(", ");
   const joints = [
-    plot("joint-angles", `Joint ${arm.joints_only ? "values" : "angles"} [${unit}]`, "angles", 2, 1, true),
+    plot("joint-angles", `${arm.joints_only ? "Joint values" : "Joint angles"} [${unit}]`, "angles", 2, 1, true),
     plot("joint-speeds", `Joint speeds [${unit}/s]`, "speeds", 2, 1, true),
     plot("tracking", `Tracking error [${unit}]`, "errors", 0.01, 3, true),
   ];

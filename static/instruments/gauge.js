@@ -1,6 +1,7 @@
 // Gauges: a number on an arc with zones, and rows of bars for several numbers of one kind.
 import { write } from "../dom.js";
-import { arc, clamp, html, set, svg } from "./shape.js";
+import { arc } from "./parts.js";
+import { clamp, drawing, html, set, svg } from "./shape.js";
 
 /** @typedef {{ below?: number, above?: number, tone: string }} Zone */
 /**
@@ -31,27 +32,11 @@ export class Gauge {
       const [from, to] = below === undefined ? [above ?? high, high] : [low, below];
       return svg("path", { class: `zone ${tone}`, d: arc(53, this.#turn(from), this.#turn(to)) });
     });
-    this.element = html(
-      "div",
-      {
-        class: "gauge", role: "meter", "aria-label": title,
-        "aria-valuemin": low, "aria-valuemax": high, "aria-valuenow": low, "aria-valuetext": "none",
-      },
-      html(
-        "div",
-        { class: "dial" },
-        svg(
-          "svg",
-          { viewBox: "-58 -58 116 92", "aria-hidden": "true" },
-          svg("path", { class: "range", d: arc(RING, FROM, TO) }),
-          this.#parts.way,
-          ...marks.reverse(),
-        ),
-        this.#parts.value,
-        html("span", { class: "unit" }, unit),
-      ),
-      this.#parts.note,
-    );
+    const range = svg("path", { class: "range", d: arc(RING, FROM, TO) });
+    const picture = drawing("-58 -58 116 92", range, this.#parts.way, ...marks.reverse());
+    const dial = html("div", { class: "dial" }, picture, this.#parts.value, html("span", { class: "unit" }, unit));
+    const values = { "aria-valuemin": low, "aria-valuemax": high, "aria-valuenow": low, "aria-valuetext": "none" };
+    this.element = html("div", { class: "gauge", role: "meter", "aria-label": title, ...values }, dial, this.#parts.note);
   }
 
   /** Show `value` with a note; null if there is no value. @param {number | null} value */
@@ -88,16 +73,9 @@ export class Bars {
     this.#rows = rows.map(({ label, limit }) => {
       const bar = html("i");
       const value = html("output", {}, "–");
-      const row = html(
-        "div",
-        {
-          role: "meter", "aria-label": `${title}, ${label}`,
-          "aria-valuemin": (-limit).toFixed(1), "aria-valuemax": limit.toFixed(1), "aria-valuenow": "0",
-        },
-        html("span", {}, label.replace("Axis ", "")),
-        html("div", { class: "track" }, bar),
-        value,
-      );
+      const values = { "aria-valuemin": (-limit).toFixed(1), "aria-valuemax": limit.toFixed(1), "aria-valuenow": "0" };
+      const name = html("span", {}, label.replace("Axis ", ""));
+      const row = html("div", { role: "meter", "aria-label": `${title}, ${label}`, ...values }, name, html("div", { class: "track" }, bar), value);
       return { row, bar, value, limit };
     });
     const limits = html("p", { class: "note" }, `${unit}, full scale is the limit`);

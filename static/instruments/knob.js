@@ -1,6 +1,7 @@
 // A knob: an arc for the range, a pointer for the goal, a mark for the value of the arm.
 import { write } from "../dom.js";
-import { arc, clamp, html, onDial, set, svg } from "./shape.js";
+import { arc, onDial } from "./parts.js";
+import { clamp, drawing, html, set, svg } from "./shape.js";
 
 /**
  * @typedef {object} KnobOptions
@@ -46,24 +47,12 @@ export class Knob {
       goal: html("output", { class: "goal" }, "–"),
       now: html("span", { class: "now" }),
     };
-    this.dial = html(
-      "div",
-      {
-        class: "dial", role: "slider", tabindex: 0, "aria-label": title, "aria-valuemin": low,
-        "aria-valuemax": high, "aria-orientation": "horizontal",
-      },
-      svg(
-        "svg",
-        { viewBox: "-53 -53 106 106", "aria-hidden": "true" },
-        svg("path", { class: "range", d: arc(RING, this.#turn.of(low), this.#turn.of(high)) }),
-        ...limits.map(([x, y]) => svg("circle", { class: "limit", cx: x.toFixed(2), cy: y.toFixed(2), r: 4 })),
-        this.#parts.way,
-        svg("circle", { class: "cap", r: 40 }),
-        this.#parts.pointer,
-        this.#parts.mark,
-      ),
-      html("div", { class: "read" }, this.#parts.goal, this.#parts.now),
-    );
+    const { way, pointer, mark, goal, now } = this.#parts;
+    const range = svg("path", { class: "range", d: arc(RING, this.#turn.of(low), this.#turn.of(high)) });
+    const ends = limits.map(([x, y]) => svg("circle", { class: "limit", cx: x.toFixed(2), cy: y.toFixed(2), r: 4 }));
+    const picture = drawing("-53 -53 106 106", range, ...ends, way, svg("circle", { class: "cap", r: 40 }), pointer, mark);
+    const values = { "aria-valuemin": low, "aria-valuemax": high, "aria-orientation": "horizontal" };
+    this.dial = html("div", { class: "dial", role: "slider", tabindex: 0, "aria-label": title, ...values }, picture, html("div", { class: "read" }, goal, now));
     this.element = html("div", { class: "knob" }, this.dial);
     this.#listen();
   }

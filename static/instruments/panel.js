@@ -4,7 +4,8 @@ import { Board } from "./board.js";
 import { instruments } from "./catalogue.js";
 import { channelsOf } from "./channels.js";
 import { History } from "./history.js";
-import { html, set } from "./shape.js";
+import { toggle } from "./parts.js";
+import { html } from "./shape.js";
 
 const HZ = 30;
 const LOOK_EVERY = 1000; // ms; the control loop reports its lateness at this interval
@@ -112,12 +113,10 @@ export class Panel {
       choice.addEventListener("change", () => this.#look({ span: Number(span) }));
       return html("label", {}, choice, html("span", {}, label));
     });
-    const pause = toggle("Pause", "Stop the plots; new values are still stored", (on) =>
-      this.#look({ end: on ? (this.#history?.newest ?? null) : null }),
-    );
-    const choose = toggle("Choose", "Show and hide instruments", (on) => {
-      if (this.#board) this.#board.list.hidden = !on;
+    const pause = toggle("Pause", (on) => this.#look({ end: on ? (this.#history?.newest ?? null) : null }), {
+      title: "Stop the plots; new values are still stored",
     });
+    const choose = toggle("Choose", (on) => this.#board?.list.toggleAttribute("hidden", !on), { title: "Show and hide instruments" });
     return html(
       "div",
       { class: "toolbar", role: "group", "aria-label": "Plots and cards" },
@@ -131,15 +130,4 @@ export class Panel {
     Object.assign(this.#view, news);
     for (const { plot } of this.#board?.instruments ?? []) plot?.refresh();
   }
-}
-
-/** @param {string} label @param {string} title @param {(on: boolean) => void} change */
-function toggle(label, title, change) {
-  const button = html("button", { type: "button", title, "aria-pressed": "false" }, label);
-  button.addEventListener("click", () => {
-    const on = button.getAttribute("aria-pressed") !== "true";
-    set(button, "aria-pressed", on);
-    change(on);
-  });
-  return button;
 }

@@ -1,6 +1,7 @@
 // A plot of some channels over the last seconds, with a cursor for reading.
-import { write } from "../dom.js";
+import { t, write } from "../dom.js";
 import { GAP } from "./history.js";
+import { toggle } from "./parts.js";
 import { digits, scale } from "./scale.js";
 import { clamp, html, set, signed } from "./shape.js";
 
@@ -78,16 +79,9 @@ export class Plot {
   #entry(channel, i) {
     const value = html("output", {}, "–");
     const { label, short = label } = this.#history.channels[channel];
-    const button = html(
-      "button",
-      { type: "button", "aria-pressed": "true", class: `series-${(i % SERIES) + 1}` },
-      // The rest of the label is for screen readers: a name has to contain what is seen.
-      html("i"), html("span", {}, html("small", {}, label.slice(0, label.length - short.length)), short), value,
-    );
-    button.addEventListener("click", () => {
-      set(button, "aria-pressed", button.getAttribute("aria-pressed") !== "true");
-      this.refresh();
-    });
+    // The rest of the label is for screen readers: a name has to contain what is seen.
+    const name = html("span", {}, html("small", {}, label.slice(0, label.length - short.length)), short);
+    const button = toggle([html("i"), name, value], () => this.refresh(), { "aria-pressed": true, class: `series-${(i % SERIES) + 1}` });
     return { channel, button, value };
   }
 
@@ -188,7 +182,7 @@ export class Plot {
       const at = Math.round(y(value)) + 0.5;
       pen.moveTo(box.left, at);
       pen.lineTo(box.right, at);
-      pen.fillText(signed(value, digits(axis.by)), box.left - 6, at);
+      pen.fillText(t(signed(value, digits(axis.by))), box.left - 6, at);
     }
     pen.textBaseline = "alphabetic";
     const room = ((box.right - box.left) * APART[span]) / span;
@@ -199,7 +193,7 @@ export class Plot {
       pen.lineTo(at, box.bottom);
       if (back % labelled) continue;
       pen.textAlign = back === 0 ? "right" : back === span ? "left" : "center";
-      pen.fillText(back > 0 ? `−${back} s` : end === null ? "now" : "paused", at, box.bottom + 14);
+      pen.fillText(t(back > 0 ? `−${back} s` : end === null ? "now" : "paused"), at, box.bottom + 14);
     }
     pen.stroke();
   }
@@ -264,7 +258,7 @@ export class Plot {
       pen.arc(at, y(history.value(channel, n)), 3.5, 0, 2 * Math.PI);
       pen.fill();
     });
-    const words = `${signed(history.time(n) - to, 2)} s`;
+    const words = t(`${signed(history.time(n) - to, 2)} s`);
     const wide = pen.measureText(words).width + 10;
     const left = clamp(at - wide / 2, box.left, box.right - wide);
     pen.fillStyle = line;

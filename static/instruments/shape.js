@@ -1,4 +1,4 @@
-// Functions that create HTML and SVG elements, draw round scales and format numbers.
+// Functions that create HTML and SVG elements and format numbers.
 const SVG = "http://www.w3.org/2000/svg";
 
 /** @typedef {Record<string, string | number | boolean>} Attributes */
@@ -19,6 +19,9 @@ export function svg(tag, attributes = {}, ...children) {
   return filled(document.createElementNS(SVG, tag), attributes, children);
 }
 
+/** Return a drawing that screen readers leave out. @param {string} viewBox @param {Node[]} parts */
+export const drawing = (viewBox, ...parts) => svg("svg", { viewBox, "aria-hidden": "true" }, ...parts);
+
 /** @template {Element} T @param {T} element @param {Attributes} attributes @param {(Node | string)[]} children */
 function filled(element, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) set(element, name, value);
@@ -31,23 +34,6 @@ function filled(element, attributes, children) {
 export function set(element, name, value) {
   const text = String(value);
   if (element.getAttribute(name) !== text) element.setAttribute(name, text);
-}
-
-/** Return the point on a dial at `degrees`, clockwise from the top. @param {number} radius @param {number} degrees */
-export function onDial(radius, degrees) {
-  const angle = (degrees * Math.PI) / 180;
-  return [radius * Math.sin(angle), -radius * Math.cos(angle)];
-}
-
-/** @param {number} radius @param {number} from @param {number} to */
-export function arc(radius, from, to) {
-  const [low, high] = from < to ? [from, to] : [to, from];
-  const [x0, y0] = onDial(radius, low);
-  const [x1, y1] = onDial(radius, Math.min(high, low + 359.9));
-  const large = high - low > 180 ? 1 : 0;
-  /** @param {number} value */
-  const round = (value) => value.toFixed(2);
-  return `M${round(x0)} ${round(y0)}A${radius} ${radius} 0 ${large} 1 ${round(x1)} ${round(y1)}`;
 }
 
 /** @param {number} value @param {number} low @param {number} high */

@@ -89,8 +89,7 @@ export class Steps {
     return this.#arm.turns_elbow ?? false;
   }
 
-  // Return whether the key was handled. moves: {code: [axis, sign]} of the keys that move.
-  /** @param {KeyboardEvent} event @param {Moves} moves */
+  /** Return whether the key was handled. moves: {code: [axis, sign]} of the keys that move. @param {KeyboardEvent} event @param {Moves} moves */
   key(event, moves) {
     const pressed = event.type === "keydown" && !event.repeat;
     if (event.code in GRIPPER_KEYS && this.#arm.gripper) {

@@ -6,11 +6,6 @@ import { messageOf, request } from "../server.js";
 const box = element("phone", HTMLDialogElement);
 const style = styled("phone.css", import.meta.url);
 
-const expand = () => {
-  for (const button of document.querySelectorAll("[aria-controls=phone]")) button.setAttribute("aria-expanded", String(box.open));
-};
-box.addEventListener("close", expand);
-
 /** @param {{ url: string | null, code: string, note: string, command: string | null }} address @param {Page.Toast} toast */
 function shown({ url, code, note, command }, toast) {
   const head = html("form", { method: "dialog" }, html("h1", {}, "Open on your phone"), html("button", {}, "Close"));
@@ -39,7 +34,6 @@ export async function toggle(toast) {
     box.replaceChildren(...shown(await answer.json(), toast));
     await style;
     box.show();
-    expand();
   } catch (error) {
     toast(`There is no address for a phone: ${messageOf(error)}`);
   }

@@ -1,5 +1,5 @@
 // The choice of another robot. Loaded on first use.
-import { element, styled } from "../dom.js";
+import { element, onChoice, styled } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { messageOf, request } from "../server.js";
 
@@ -108,13 +108,8 @@ async function upload(file, main = "") {
   }
 }
 
-const expand = () => document.getElementById("robots-button")?.setAttribute("aria-expanded", String(box.open));
-box.addEventListener("close", expand);
 search.addEventListener("input", draw);
-field.addEventListener("change", () => {
-  if (field.files?.length) upload(field.files[0]);
-  field.value = "";
-});
+onChoice(field, ([file]) => upload(file));
 /** @param {Page.Status} status */
 function note({ robot }) {
   if (!robot) return;
@@ -124,8 +119,7 @@ function note({ robot }) {
   else if (robot.problem && robot.problem !== before?.problem) report(robot.problem);
 }
 
-// Show the choice, or hide it again. `options.file`: a description that was dropped on the page.
-/** @param {{ page: Page.Context, file?: File }} options */
+/** Show the choice, or hide it again. `options.file`: a description that was dropped on the page. @param {{ page: Page.Context, file?: File }} options */
 export async function toggle(options) {
   if (!page) options.page.store.follow(note);
   ({ page } = options);
@@ -134,7 +128,6 @@ export async function toggle(options) {
   report(driven?.problem ?? "");
   details.hidden = true;
   if (!box.open) box.show();
-  expand();
   await load();
   if (options.file) upload(options.file);
 }

@@ -25,8 +25,7 @@ function head(words, end = "") {
   cut.forEach((part, i) => write(headline.children[i], part));
 }
 
-// Show whether there is a connection for the controls that need one. They keep the focus; a press says why nothing happens.
-/** @param {boolean} possible */
+/** Show whether there is a connection for the controls that need one. They keep the focus; a press says why nothing happens. @param {boolean} possible */
 function offer(possible) {
   body.classList.toggle("offline", !possible);
   for (const control of document.querySelectorAll("#acts :is(button, select), #orders button, #clear-stop"))

@@ -1,4 +1,5 @@
 // The buttons of the lease: take, request, give and release the arm.
+import { t } from "../dom.js";
 import { button } from "../instruments/shape.js";
 
 const MAIN = { class: "main" };
@@ -52,13 +53,13 @@ function handOver(others, say) {
 }
 
 /** @param {Element | null} control */
-const labelOf = (control) => control?.getAttribute("aria-label") ?? control?.textContent;
+const labelOf = (control) => control?.getAttribute("aria-label") ?? control?.textContent ?? "";
 
 // Replace the controls in `group`. The focus, and the choice of a list, stay with the same label.
 /** @param {HTMLElement} group @param {HTMLElement[]} controls */
 export function replaceKeepingFocus(group, controls) {
   const old = document.activeElement;
-  const same = group.contains(old) ? controls.find((control) => labelOf(control) === labelOf(old)) : undefined;
+  const same = group.contains(old) ? controls.find((control) => t(labelOf(control)) === labelOf(old)) : undefined;
   if (same instanceof HTMLSelectElement && old instanceof HTMLSelectElement)
     if ([...same.options].some(({ value }) => value === old.value)) same.value = old.value;
   group.replaceChildren(...controls);

@@ -41,8 +41,7 @@ export class Sheets {
       });
   }
 
-  // Show what was open at the last visit, as soon as the server offers it. The edge of the dock waits for `rest`.
-  /** @param {Promise<void>} rest */
+  /** Show what was open at the last visit, as soon as the server offers it. The edge of the dock waits for `rest`. @param {Promise<void>} rest */
   async begin(rest) {
     const open = this.#page.kept.getItem(OPEN)?.split(" ") ?? [];
     if (beside.matches) this.#waiting = new Set(SHEETS.filter((id) => open.includes(id)));

@@ -53,8 +53,7 @@ export class People {
     this.watch(true);
   }
 
-  // The second click revokes a link, because nothing brings it back.
-  /** @param {Api.ConnectedPerson} person @param {HTMLButtonElement} button */
+  /** The second click revokes a link, because nothing brings it back. @param {Api.ConnectedPerson} person @param {HTMLButtonElement} button */
   kick({ person, name }, button) {
     const { value } = this.select;
     if (value !== "revoke") this.say({ do: "kick", person, seconds: Number(value) });

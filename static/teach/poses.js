@@ -48,8 +48,7 @@ function within(value, low, high) {
   return (rounded < low ? Math.ceil(low * 1000) / 1000 : rounded) + 0;
 }
 
-// Return why the arm has to rest at the pose `i`; empty if it can pass it with a rounded corner.
-/** @param {Pose[]} poses @param {number} i */
+/** Return why the arm has to rest at the pose `i`; empty if it can pass it with a rounded corner. @param {Pose[]} poses @param {number} i */
 export function restsBecause(poses, i) {
   const next = poses[i + 1];
   if (!next) return "The arm rests at the last pose.";

@@ -1,6 +1,6 @@
 // One pose in the list: its picture, which is also its handle, its numbers and its buttons.
 import { write } from "../dom.js";
-import { button, html, set, svg } from "../instruments/shape.js";
+import { button, drawing, html, set, svg } from "../instruments/shape.js";
 import { MAX_WAIT, restsBecause } from "./poses.js";
 
 /** @typedef {import("./poses.js").Pose} Pose */
@@ -21,7 +21,7 @@ const SHAPES = {
 
 /** Return a button with a picture. @param {Shape} name @param {() => void} act @param {Node[]} words */
 export const drawn = (name, act, ...words) =>
-  button([svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d: SHAPES[name] })), ...words], act, { class: name });
+  button([drawing("0 0 20 20", svg("path", { d: SHAPES[name] })), ...words], act, { class: name });
 
 /**
  * @param {string} label @param {string} unit @param {number} low @param {number} high @param {number} step

@@ -9,8 +9,7 @@ const ENDS = ["done", "stopped", "failed", "cancelled", "refused"];
 /** @param {number} ms */
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-// Return the requests that send `text`. fields: of each request.
-/** @param {string} text @param {Partial<Api.Program>} fields @returns {Api.Program[]} */
+/** Return the requests that send `text`. fields: of each request. @param {string} text @param {Partial<Api.Program>} fields @returns {Api.Program[]} */
 export function parts(text, fields = {}) {
   // eslint-disable-next-line no-control-regex
   const size = /^[\x00-\x7f]*$/.test(text) ? LONG : SHORT;

@@ -1,5 +1,5 @@
 // Scripts in files: those of the server's folder, and those of the person.
-import { save } from "../dom.js";
+import { onChoice, save } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { request } from "../server.js";
 
@@ -20,7 +20,7 @@ export class Scripts {
   constructor(sheet) {
     this.#sheet = sheet;
     this.open.addEventListener("change", () => this.#choose());
-    this.#file.addEventListener("change", () => this.#take());
+    onChoice(this.#file, async ([file]) => sheet.load(await file.text(), file.name.replace(/\.ya?ml$/i, "")));
   }
 
   // List the scripts of the server.
@@ -42,12 +42,6 @@ export class Scripts {
     if (name === FILE) return this.#file.click();
     if (name === NEW) return this.#sheet.begin();
     await this.#sheet.attempt(async () => this.#sheet.load(await (await request(`api/v1/scripts/${encodeURIComponent(name)}`)).text(), name));
-  }
-
-  async #take() {
-    const file = this.#file.files?.[0];
-    this.#file.value = "";
-    if (file) await this.#sheet.load(await file.text(), file.name.replace(/\.ya?ml$/i, ""));
   }
 
   #download() {

@@ -1,6 +1,6 @@
 // The sheet of programs: one program at a time, as poses that are recorded and ordered, as its steps, or as text. It is
 // previewed, run and saved.
-import { element, first, matches, styled, write } from "../dom.js";
+import { element, first, styled, write } from "../dom.js";
 import { button, html, set } from "../instruments/shape.js";
 import { messageOf, readArm, readState } from "../server.js";
 import { thumbnail } from "../viser/pictures.js";
@@ -88,7 +88,6 @@ export class Teach {
       this.content.change({ times });
     });
     this.#name.addEventListener("change", () => this.content.change({ name: this.#name.value.trim() || "My script" }));
-    this.#sheet.addEventListener("keydown", (event) => this.#key(event));
     if (this.content.now.text !== null) [this.editor.text, this.#view] = [this.content.now.text, "steps"];
     this.#draw();
     if (this.content.broken) this.report("What this browser had kept cannot be read, so the list is empty.");
@@ -126,15 +125,6 @@ export class Teach {
 
   get #poses() {
     return this.content.now.poses;
-  }
-
-  /** Ctrl-Z and Ctrl-Y, except in a box, which has its own. @param {KeyboardEvent} event */
-  #key(event) {
-    const key = event.key.toLowerCase();
-    if (!(event.ctrlKey || event.metaKey) || !["z", "y"].includes(key) || matches(event.target, "input, textarea")) return;
-    event.preventDefault();
-    if (key === "y" || event.shiftKey) this.content.redo();
-    else this.content.undo();
   }
 
   // Poses
@@ -220,8 +210,7 @@ export class Teach {
     this.editor.focus();
   }
 
-  // Show a line of the text; its block stays marked in the list of steps.
-  /** @param {number} line */
+  /** Show a line of the text; its block stays marked in the list of steps. @param {number} line */
   jump(line) {
     this.#steps.select(line);
     this.#toText();
@@ -282,8 +271,7 @@ export class Teach {
     this.content.change({ name: "My script", times: 1, poses: [], text: null });
   }
 
-  // Show a script: as poses if it has only these, otherwise its steps, or its text if this has errors.
-  /** @param {string} text @param {string} name */
+  /** Show a script: as poses if it has only these, otherwise its steps, or its text if this has errors. @param {string} text @param {string} name */
   async load(text, name) {
     this.editor.text = text;
     this.#view = "steps";

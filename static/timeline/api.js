@@ -6,8 +6,7 @@ import { queryOf, request } from "../server.js";
 /** @typedef {{ t: number[], joints: number[], slides: number[], tool: number[] }} Difference */
 const API = "api/v1/playback";
 
-// Return the answer, or null if it has no content. Throws an error with the reason for a refusal.
-/** @param {string} url @param {RequestInit} [options] */
+/** Return the answer, or null if it has no content. Throws an error with the reason for a refusal. @param {string} url @param {RequestInit} [options] */
 export async function answered(url, options) {
   const answer = await request(url, options);
   return answer.status === 204 ? null : answer.json();

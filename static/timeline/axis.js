@@ -13,8 +13,7 @@ export function atPlace(spans, place) {
   return spans.at(-1)?.[1] ?? 0;
 }
 
-// Return the place [s] of a time on the axis; inside a rest, that of its start.
-/** @param {import("./api.js").Span[]} spans @param {number} t */
+/** Return the place [s] of a time on the axis; inside a rest, that of its start. @param {import("./api.js").Span[]} spans @param {number} t */
 export function placeOf(spans, t) {
   let place = 0;
   for (const [start, end] of spans) {

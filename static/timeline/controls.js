@@ -1,6 +1,6 @@
 // The elements of the timeline: its track, its buttons and its lists.
 import { write } from "../dom.js";
-import { button, html, svg } from "../instruments/shape.js";
+import { button, drawing, html, svg } from "../instruments/shape.js";
 import { clock } from "../page/words.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
@@ -10,7 +10,7 @@ const KINDS = { stop: "Stop", clear_stop: "Stop cleared", driver: "Driver", prog
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
 
 /** @param {keyof typeof ICONS} name */
-const icon = (name) => svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d: ICONS[name] }));
+const icon = (name) => drawing("0 0 20 20", svg("path", { d: ICONS[name] }));
 
 /** @param {string | number} value @param {string} words */
 export const option = (value, words) => html("option", { value }, words);

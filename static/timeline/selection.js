@@ -50,8 +50,7 @@ export class Selection {
     return [start === null ? 0 : placeOf(spans, start), end === null ? lengthOf(spans) : placeOf(spans, end)];
   }
 
-  // The recording `of` and the times of the selection; null if nothing is recorded.
-  /** @param {string} of @param {Span[]} spans @returns {Part | null} */
+  /** The recording `of` and the times of the selection; null if nothing is recorded. @param {string} of @param {Span[]} spans @returns {Part | null} */
   partOf(of, spans) {
     if (spans.length) return { of, from: this.start(spans), to: this.end(spans) };
     this.#page.toast(NOTHING);

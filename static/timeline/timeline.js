@@ -1,5 +1,5 @@
 // The timeline: what the server has recorded, or a file, shown in this window alone at any moment.
-import { element, sceneOf, styled, write } from "../dom.js";
+import { element, onChoice, sceneOf, styled, write } from "../dom.js";
 import { html } from "../instruments/shape.js";
 import { addressed } from "../page/words.js";
 import { messageOf } from "../server.js";
@@ -157,11 +157,7 @@ export class Timeline {
     end.addEventListener("input", () => this.#select(1, Number(end.value)));
     of.addEventListener("change", () => (of.value === "file" ? this.#ask((name) => this.#choose(name)) : this.#choose(of.value)));
     second.addEventListener("change", () => (second.value === "file" ? this.#ask((name) => this.#compare(name)) : this.#compare(second.value)));
-    file.addEventListener("change", () => {
-      const chosen = file.files?.[0];
-      file.value = "";
-      if (chosen) this.replay(chosen, this.#use);
-    });
+    onChoice(file, ([chosen]) => this.replay(chosen, this.#use));
     // A finger opens the thin line first; a pointer is over it then, and the line has grown.
     this.#box.addEventListener("click", () => {
       if (!this.open && matchMedia("(hover: none)").matches) this.show(true, true);

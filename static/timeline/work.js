@@ -1,4 +1,5 @@
 // Long work of the server on a recording, an export or a verification: its progress, and the result.
+import { write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { messageOf, queryOf } from "../server.js";
 import { answered } from "./api.js";
@@ -66,12 +67,11 @@ export class Work {
   #show(words, fraction) {
     const percent = fraction ? ` ${Math.round(100 * fraction)} %` : "";
     const text = fraction === undefined ? words : `${words} …${percent}`;
-    if (this.#words.textContent !== text) this.#words.textContent = text;
+    write(this.#words, text);
     this.#bar.hidden = fraction === undefined;
     if (fraction) this.#bar.value = fraction;
     else this.#bar.removeAttribute("value");
-    const label = fraction === undefined ? "Close" : "Cancel";
-    if (this.#end.textContent !== label) this.#end.textContent = label;
+    write(this.#end, fraction === undefined ? "Close" : "Cancel");
     this.#box.hidden = false;
   }
 

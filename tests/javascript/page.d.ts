@@ -148,6 +148,8 @@ declare namespace ViserPage {
 
 // What the browser or viser defines and TypeScript does not know.
 interface Window {
+  /** Set by language/translator.js: returns a text in the language of the page. */
+  translated?: (words: string) => string;
   /** Set by page.js for the frame that viser's page is in. */
   katana?: {
     key(event: KeyboardEvent): void; blur(): void; toast(words: string): void; drawn(): void; used(): void;
