@@ -17,6 +17,7 @@ const STEADY = 1000; // ms for which viser must keep the restored camera
 const ROOMS = JSON.parse(document.currentScript?.dataset.rooms ?? "{}");
 const outer = window.parent === window ? null : window.parent;
 
+if (window.parent.document.documentElement.lang !== "en") import("./language/translator.js");
 document.documentElement.dataset.loading = "";
 Viser.keepFocus();
 Viser.forgoCode();

@@ -2,10 +2,10 @@
 import { element, first, onClick, save, timestamp } from "./dom.js";
 import { picture } from "./viser/pictures.js";
 
-const NAME = "katana450.name";
+const [NAME, LANGUAGE] = ["katana450.name", "katana450.language"];
 const dialog = element("more", HTMLDialogElement);
-const button = element("more-button", HTMLButtonElement);
 const theme = first("#theme select", HTMLSelectElement);
+const language = first("#language select", HTMLSelectElement);
 const field = element("own-name", HTMLInputElement);
 const why = element("own-name-why", HTMLElement);
 const ID = "name"; // id of the request for a name
@@ -32,9 +32,9 @@ function open() {
   element("phone", HTMLDialogElement).close();
   field.value = known;
   theme.value = document.documentElement.dataset.theme === "dark" ? "Dark" : "Light";
+  language.value = document.documentElement.lang;
   refuse("");
   dialog.show();
-  button.setAttribute("aria-expanded", "true");
   field.select();
 }
 
@@ -52,14 +52,17 @@ export function begin(context) {
   page = context;
   const { toast } = page;
   const toggle = () => (dialog.open ? dialog.close() : open());
-  button.addEventListener("click", toggle);
+  onClick("more-button", toggle);
   first("#who p", HTMLElement).addEventListener("click", toggle);
-  dialog.addEventListener("close", () => button.setAttribute("aria-expanded", "false"));
   element("own-name-form", HTMLFormElement).addEventListener("submit", (event) => {
     event.preventDefault();
     ask(field.value);
   });
   theme.addEventListener("change", async () => (await import("./theme.js")).choose(theme.value));
+  language.addEventListener("change", () => {
+    page.kept.setItem(LANGUAGE, language.value);
+    location.reload();
+  });
   onClick("snapshot", snapshot);
   onClick("robots-button", () => chooseRobot());
   // In the bar, or in the menu for a finger.

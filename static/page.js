@@ -23,6 +23,7 @@ const DRAW_EVERY = 200; // ms between two looks at the age of the picture
 const SIGN_IN = 4401; // close code: the page has to sign in again
 const REPEATED = ["heartbeat", "jog", "servo", "query", "list_people"]; // requests that are sent without a press
 
+if (document.documentElement.lang !== "en") import("./language/translator.js");
 const worker = new Worker("static/link.js");
 /** @param {Page.Order} order */
 const send = (order) => worker.postMessage(order);

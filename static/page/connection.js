@@ -16,8 +16,9 @@ export function drawLink({ store }, unanswered) {
   const link = element("link", HTMLElement);
   link.className = !up ? "lost" : bad || age >= 0.4 || trip > SLOW ? "slow" : "";
   const old = age >= 0.3 ? `, ${age.toFixed(1)} s old` : "";
-  first(":scope > :last-child", Element, link).textContent = !up ? "Offline" : store.trip === null ? "" : `${Math.round(trip)} ms${old}`;
-  link.title = `${ROUND_TRIP}: ${link.textContent?.trim()}`;
+  const quality = !up ? "Offline" : store.trip === null ? "" : `${Math.round(trip)} ms${old}`;
+  write(first(":scope > :last-child", Element, link), quality);
+  link.title = `${ROUND_TRIP}: ${quality}`;
   document.body.classList.toggle("stale", !up || bad);
   const banner = element("banner", HTMLElement);
   const missing = status?.problem ?? "";

@@ -85,7 +85,7 @@ class ViserPage:
         page.on("pageerror", lambda error: errors.append(str(error)))
         try:
             if drawing is Drawing.NONE:
-                page.route("**/viser/**", lambda route: route.abort())
+                page.route(f"{url}/viser/**", lambda route: route.abort())
                 page.goto(url)
                 return cls(page, page.main_frame, errors)
             page.on("console", lambda row: errors.append(row.text) if row.type == "error" else None)

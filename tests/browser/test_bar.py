@@ -217,8 +217,10 @@ def test_the_page_is_small() -> None:
     ours = ("index.html", "page.css", page_routes.PAGE_SCRIPTS, "link.js", "icon.svg")
     assert sum(sent[name] for name in ours) < 30_300
     assert sum(sent[name] for name in (*ours, SCRIPTS)) < 39_600
+    # Another language than English takes one catalogue.
+    assert all(size < 20_000 for name, size in sent.items() if name.startswith("language/"))
     # The modules in these scripts are also there alone, for people.
-    together = re.compile(r"[^/]*|(page|viser)/.*")
+    together = re.compile(r"[^/]*|(page|viser|language)/.*")
     sent = {name: size for name, size in sent.items() if not together.fullmatch(name)}
     # The timeline and programs are only for those who open them, the form of an object for those
     # who open Objects, episodes for servers that record, and the arm for those who have one.

@@ -51,10 +51,10 @@ STOP_PORT = "X-Stop-Port"
 """Header that names the port to which the page also sends STOP."""
 
 
-INDEX, THEME = "index.html", "theme.js"
-"""Our page, and its first module, which sets the theme before anything is drawn."""
+INDEX, FIRST = "index.html", "language.js"
+"""Our page, and its first module, which sets language and theme before anything is drawn."""
 
-THEME_ELEMENT = b'<script type="module" src="static/theme.js"></script>'
+FIRST_ELEMENT = b'<script type="module" src="static/language.js"></script>'
 """Element of that module in the page, which contains it when it is sent."""
 
 PAGE_ELEMENT = b'<script type="module" src="static/page.js"></script>'
@@ -82,9 +82,9 @@ class _Entry(msgspec.Struct, forbid_unknown_fields=True):
 def page_files() -> dict[str, File]:
     """Return every file of the page by its path, with the modules of each document in one file."""
     files = contents()
-    theme = b"<script>%s</script>" % put_together(THEME, files)
+    first = b"<script>%s</script>" % put_together(FIRST, files)
     page = f'<script src="static/{PAGE_SCRIPTS}" defer></script>'.encode()
-    files[INDEX] = files[INDEX].replace(THEME_ELEMENT, theme).replace(PAGE_ELEMENT, page)
+    files[INDEX] = files[INDEX].replace(FIRST_ELEMENT, first).replace(PAGE_ELEMENT, page)
     files |= {name: put_together(entry, files) for name, entry in ENTRIES.items()}
 
     def packed() -> dict[str, File]:
