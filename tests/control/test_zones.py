@@ -11,7 +11,8 @@ import pytest
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.environment import obstacle_of
 from katana450.arm.control.session.plans import plan_along
-from katana450.arm.control.session.session import SLOW_SPEED, Session
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.slow_zones import SLOW_SPEED
 from katana450.arm.control.state.scene_objects import SceneObject, Shape, Zone
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.errors import InputError
@@ -104,8 +105,11 @@ def is_inside(session: Session, state: State) -> bool:
     return any("people" in contact.parts and contact.distance < 0.0 for contact in contacts)
 
 
-def passage(session: Session, command: cmd.Command) -> None:
-    """Let the arm move through the zone and out of it; check its speed and its findings."""
+def passage(session: Session, command: cmd.Command) -> float:
+    """Let the arm move through the zone and out of it; check its speed and its findings.
+
+    Return the time [s] that it takes.
+    """
     state = begun(session, SLOW)
     ticks = until_rest(session, state, cmd.Speed(1.0), command)
     inside = [passed for passed in ticks if is_inside(session, passed)]
@@ -119,6 +123,7 @@ def passage(session: Session, command: cmd.Command) -> None:
     assert max(speed_of(session, passed) for passed in ticks) > 1.2 * SLOW_SPEED
     assert ticks[-1].findings == ()
     assert ticks[-1].speed == 1.0
+    return ticks[-1].t - state.t
 
 
 @pytest.mark.parametrize(
@@ -128,11 +133,30 @@ def test_the_tool_is_slow_in_a_zone(session: Session, command: cmd.Command) -> N
     passage(session, command)
 
 
-def test_a_plan_is_slow_in_a_zone(session: Session) -> None:
+def test_a_plan_is_slow_in_a_zone_and_says_its_time(session: Session) -> None:
     arm = session.require_arm()
-    state = begun(session)
     path = JointPath(arm.chain, np.array((LOW, LOW - (1.4, 0.0, 0.0, 0.0, 0.0))))
-    passage(session, cmd.Follow(plan_along(arm, session.world_at(state), state, [path])))
+    slow, free = (
+        plan_along(arm, session.world_at(state), state, [path])
+        for state in (begun(session, SLOW), begun(session))
+    )
+    time = passage(session, cmd.Follow(slow))
+    assert slow.duration == pytest.approx(time, rel=0.03)
+    assert free.duration < 0.9 * time
+    # At half of full speed no zone slows the arm.
+    assert slow.duration_at(0.5) == pytest.approx(free.duration_at(0.5))
+
+
+def test_what_the_hand_carries_is_slow_in_a_zone(session: Session) -> None:
+    rod = SceneObject("rod", Shape.BOX, (0.3, 0.3, 0.02), np.eye(4), fixed=True)
+    state = begun(session, SLOW, rod)
+    parts = [
+        finding.parts
+        for passed in until_rest(session, state, cmd.Joint(1, -0.6))
+        for finding in passed.findings
+        if finding.reason is Reason.SLOW_ZONE
+    ]
+    assert parts[0] == ("rod", "people")
 
 
 def test_a_jog_is_slow_in_a_zone(session: Session) -> None:

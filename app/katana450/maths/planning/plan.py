@@ -95,12 +95,15 @@ class Plan:
         fingers: angle of the finger joint meanwhile [rad].
         nearest: the minimum clearance on the whole path; None where nothing can meet or nothing was
             checked.
+        slow_span, slow_fraction: the tau [s] in which zones bound the fraction of full speed.
     """
 
     segments: tuple[Segment, ...]
     clear_of: Fingerprint | None = None
     fingers: float = 0.0
     nearest: Nearest | None = None
+    slow_span: float = 0.0
+    slow_fraction: float = 1.0
 
     @cached_property
     def begins(self) -> tuple[float, ...]:
@@ -120,7 +123,8 @@ class Plan:
 
     def duration_at(self, fraction: float) -> float:
         """Return the duration [s] at ``fraction`` of full speed, with rest between segments."""
-        return math.fsum(segment.scaling.duration_at(fraction) for segment in self.segments)
+        delay = self.slow_span * max(0.0, 1.0 / self.slow_fraction - 1.0 / fraction)
+        return delay + math.fsum(item.scaling.duration_at(fraction) for item in self.segments)
 
     @property
     def length(self) -> float:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session.session import TOOL_SPEED
+from katana450.arm.control.session.slow_zones import SLOW_SPEED, slow_span
 from katana450.arm.control.state.state import State
 from katana450.errors import BlockedError
 from katana450.maths.collision.world import CollisionWorld
@@ -63,4 +65,7 @@ def plan_along(
     tool_speed, tool_acceleration: maximum of the tool point [m/s, m/s^2].
     """
     bounds = Bounds(arm.limits, tool_speed, tool_acceleration)
-    return plan(paths, bounds, world, state.gripper_setpoint, MARGIN)
+    timed_plan = plan(paths, bounds, world, state.gripper_setpoint, MARGIN)
+    slow = SLOW_SPEED / TOOL_SPEED
+    span = 0.0 if world is None else slow_span(timed_plan, world, state.objects, slow)
+    return replace(timed_plan, slow_span=span, slow_fraction=slow) if span else timed_plan
