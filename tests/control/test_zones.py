@@ -72,6 +72,18 @@ def test_objects_fall_through_a_zone(session: Session) -> None:
     assert fallen.T[2, 3] == pytest.approx(0.0, abs=1e-4)
 
 
+def test_arm_stays_on_its_side_of_a_plane_that_is_drawn_elsewhere(session: Session) -> None:
+    R = np.array(((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)))
+    T = se3.from_rotation_translation(R, (-1.0, -0.15, 1.0))
+    plane = SceneObject("wall", Shape.PLANE, (0.1, 0.1), T, zone=Zone.KEEP_OUT)
+    (*_, end) = until_rest(session, begun(session, plane), cmd.Joint(1, -0.6))
+    (finding,) = end.findings
+    assert "wall" in (finding.parts or ())
+    assert MIN_CLEARANCE <= finding.amount < 2.0 * MIN_CLEARANCE
+    with pytest.raises(InputError, match="'wall' is a plane, so it must be a zone"):
+        replace(plane, zone=Zone.NONE)
+
+
 @pytest.mark.parametrize(
     "change", [{"can_be_held": True}, {"held": True}, {"fixed": True},
                {"shape": Shape.VESSEL, "size": (0.05, 0.1)}]

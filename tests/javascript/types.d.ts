@@ -145,7 +145,7 @@ declare namespace Api {
     wait?: number | null; node: string; field: string; value: number | number[] | null; more?: FieldSetting[]; }
   interface SetPriority { do: "set_priority"; priority: Priority; id?: number | string | null;
     revocations?: number | null; made?: number | null; }
-  type Shape = "box" | "cylinder" | "mesh" | "sphere" | "vessel";
+  type Shape = "box" | "cylinder" | "mesh" | "plane" | "sphere" | "vessel";
   interface Speed { do: "speed"; value: number; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
   interface State { is: "state"; id?: number | string | null; t: number; sent: number; ticket: number; q: number[];

@@ -331,7 +331,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
             frame: Frame of ``T``: {S} at the shoulder, or the base frame on the table.
             shape: Shape that is checked for contacts.
             size: Size of the shape [m]: box (x, y, z), cylinder and vessel (radius, height), sphere
-                (radius). The size of a mesh is that of its file.
+                (radius), plane (x, y; only drawn, it has no end). A mesh has that of its file.
             mesh: Key of the mesh, from the answer to its upload.
             can_be_held: Whether the fingers may touch the object; they hold it between both sides.
             zone: Rule for the arm in a space that all else passes through: the arm and what it carries

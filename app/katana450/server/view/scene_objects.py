@@ -30,6 +30,9 @@ ZONE_COLOURS, ZONE_OPACITY = {Zone.KEEP_OUT: (239, 130, 20), Zone.SLOW: (250, 20
 PROPS = ("cup", "basin")
 """Objects whose nodes have their names."""
 
+SHEET = 0.002
+"""[m] Thickness of a plane as it is drawn."""
+
 FACETS = 48
 """Number of facets of a cylinder."""
 
@@ -222,6 +225,8 @@ def _plain(scene_object: SceneObject) -> Any:
     match scene_object.shape:
         case Shape.BOX:
             mesh, height = trimesh.creation.box(scene_object.size), scene_object.size[2]
+        case Shape.PLANE:
+            mesh, height = trimesh.creation.box((*scene_object.size, SHEET)), -SHEET
         case Shape.CYLINDER | Shape.VESSEL:
             radius, height = scene_object.size
             mesh = trimesh.creation.cylinder(radius, height, sections=FACETS)

@@ -34,6 +34,9 @@ ROUNDING = 1e-6
 
 MIN_SCALE, MAX_SCALE = 1e-3, 1e3
 
+PLANE_DEPTH = 10.0
+"""[m] How far the space below a plane is checked to each side, and down. No arm reaches so far."""
+
 MAX_NAME_LENGTH = 40
 
 
@@ -50,6 +53,8 @@ class Shape(Enum):
     """size: radius."""
     MESH = "mesh"
     """size: along x, y, z, of its solid."""
+    PLANE = "plane"
+    """size: along x, y, as drawn. A zone: all of the space below z = 0 of its frame."""
 
     @property
     def is_round(self) -> bool:
@@ -59,7 +64,7 @@ class Shape(Enum):
     @property
     def numbers(self) -> int:
         """Number of values in a size."""
-        if self in (Shape.CYLINDER, Shape.VESSEL):
+        if self in (Shape.CYLINDER, Shape.VESSEL, Shape.PLANE):
             return 2
         return 1 if self is Shape.SPHERE else 3
 
@@ -152,6 +157,8 @@ class SceneObject:
             raise InputError(
                 f"{self.name!r} is a zone, so the hand cannot hold it and it is no vessel."
             )
+        if self.shape is Shape.PLANE and not self.is_zone:
+            raise InputError(f"{self.name!r} is a plane, so it must be a zone.")
         T = frozen(se3.validated(self.T, f"The pose of {self.name!r}"))
         if np.abs(T[:3, 3]).max() > MAX_COORDINATE:
             raise InputError(f"{self.name!r} would be more than {MAX_COORDINATE:g} m away.")
@@ -174,7 +181,9 @@ class SceneObject:
 
     @property
     def height(self) -> float:
-        """Height [m]."""
+        """Height [m]; that of a plane is below its frame."""
+        if self.shape is Shape.PLANE:
+            return -PLANE_DEPTH
         return 2.0 * self.extent[0] if self.shape is Shape.SPHERE else self.extent[-1]
 
     @property
@@ -200,6 +209,8 @@ def _simple_shape(shape: Shape, extent: tuple[float, ...]) -> CollisionShape:
             return box(extent)
         case Shape.SPHERE:
             return sphere(extent[0])
+        case Shape.PLANE:
+            return box((2.0 * PLANE_DEPTH, 2.0 * PLANE_DEPTH, PLANE_DEPTH))
     return cylinder(*extent)
 
 

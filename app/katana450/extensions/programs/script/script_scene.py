@@ -156,7 +156,9 @@ class SceneEntry(Declared):
     ]
     size: Annotated[
         tuple[float, ...],
-        SIZES.about("mm. box: x, y, z; cylinder, vessel: radius, height; sphere: radius"),
+        SIZES.about(
+            "mm. box: x, y, z; plane: x, y; cylinder, vessel: radius, height; sphere: radius"
+        ),
     ] = ()
     mesh: Annotated[MeshFile | None, record(MeshFile)] = None
     T: Annotated[
