@@ -16,7 +16,8 @@ const MOUNTS = [
 
 /** @type {[string, Api.Zone][]} */
 const ZONES = [["None: it is a body", "none"], ["The arm keeps out", "keep_out"], ["The arm is slow", "slow"]];
-const NEW_ZONE = [0.2, 0.2, 0.2]; // m
+const NEW_ZONE = /** @type {Partial<Api.Place>} */ ({ shape: "box", size: [0.2, 0.2, 0.2] }); // m
+const NEW_PLANE = /** @type {Partial<Api.Place>} */ ({ shape: "plane", size: [0.8, 0.6], T: [[1, 0, 0, 0.3], [0, 0, -1, 0.45], [0, 1, 0, 0.3], [0, 0, 0, 1]] }); // m
 
 /** Return the rotation of an object about the vertical [degrees]. @param {number[][]} T */
 const turnOf = (T) => Math.round(Math.atan2(T[1][0], T[0][0]) * DEGREES) + 0;
@@ -58,7 +59,8 @@ export class ObjectForm {
     this.#hidden.addEventListener("change", () => this.#act({ do: "place", name: this.#name, hidden: this.#hidden.checked }));
     this.#choice.addEventListener("change", () => this.#show(true));
     this.#zone.addEventListener("change", () => this.#act({ do: "place", name: this.#name, zone: /** @type {Api.Zone} */ (this.#zone.value) }));
-    onClick("add-zone", () => this.#addZone());
+    onClick("add-zone", () => this.#addZone("zone", NEW_ZONE));
+    onClick("add-plane", () => this.#addZone("plane", NEW_PLANE));
     this.element.append(
       html("div", {}, this.#choice, this.#remove),
       html("div", {}, row("Colour", this.#colour), this.#own),
@@ -106,10 +108,11 @@ export class ObjectForm {
     return sides.map((side) => Number(side.replace(",", ".")) / 1e3 / (this.#object?.scale ?? 1));
   }
 
-  #addZone() {
+  /** @param {string} word @param {Partial<Api.Place>} fields */
+  #addZone(word, fields) {
     let number = 1;
-    while (this.#objects.some(({ name }) => name === `zone ${number}`)) number += 1;
-    this.#act({ do: "place", name: `zone ${number}`, shape: "box", size: NEW_ZONE, zone: "keep_out" });
+    while (this.#objects.some(({ name }) => name === `${word} ${number}`)) number += 1;
+    this.#act({ do: "place", name: `${word} ${number}`, zone: "keep_out", ...fields });
   }
 
   /** @param {number} angle @returns {Partial<Api.Place>} */

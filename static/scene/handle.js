@@ -15,17 +15,18 @@ const STEPS = { move: 0.01, turn: 15 / DEGREES }; // m and rad, with Ctrl
 const FINE = 0.2; // fraction of the way of the pointer, with Shift
 const SOON = 5000; // ms after a drag in which a typed number belongs to it
 const FARTHEST = 1.5; // m; the server takes no larger coordinate
+const SIZE = "/size"; // end of the name of a node at a corner of a box, which changes its size
 const HANDLES = ["/target/move", "/target/elbow", "/handles"];
 const FADED = 0.25; // opacity of the other parts while one is under the pointer or dragged
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)$/;
 
 /**
  * `axis` is its own axis along which it moves, or about which it turns; null before it does. How far it is from its
- * start, in m or rad: `raw` as viser's page moves it, `value` more finely, `shown` by steps too. `sent` has the last
- * message of each phase.
+ * start, in m or rad: `raw` as viser's page moves it, `value` more finely, `shown` by steps too. All of them count from
+ * `lengths`, those of a box, otherwise 0. `sent` has the last message of each phase.
  * @typedef {object} Drag
  * @property {string} name @property {Three.Matrix4} start @property {number | null} axis @property {boolean} turns
- * @property {number} raw @property {number} value @property {number} shown @property {string} drawn
+ * @property {number[]} lengths @property {number} raw @property {number} value @property {number} shown @property {string} drawn
  * @property {Record<string, ViserPage.Message>} sent
  */
 
@@ -123,7 +124,7 @@ export class Handle {
     const phase = phaseOf(message);
     const handle = node(name);
     if (phase === "Start" && handle)
-      this.#drag = { name, start: handle.matrix.clone(), axis: null, turns: false, raw: 0, value: 0, shown: 0, drawn: "", sent: {} };
+      this.#drag = { name, start: handle.matrix.clone(), axis: null, turns: false, lengths: lengthsOf(name, handle.matrix), raw: 0, value: 0, shown: 0, drawn: "", sent: {} };
     this.#follow();
     const drag = this.#drag;
     if (!drag || !phase) return;
@@ -174,7 +175,7 @@ export class Handle {
     const { drawing, node, send } = sceneIn(this.#scene);
     const handle = drag && node(drag.name);
     if (!drag || drag.axis === null || !Update || !handle) return this.close();
-    const shown = Number(text) / (drag.turns ? DEGREES : 1000);
+    const shown = Number(text) / (drag.turns ? DEGREES : 1000) - drag.lengths[drag.axis];
     const isPossible = Math.abs(shown) <= (drag.turns ? Math.PI : FARTHEST);
     this.#number.ariaInvalid = String(!NUMBER.test(text) || !isPossible);
     if (this.#number.ariaInvalid === "true") return;
@@ -208,10 +209,10 @@ export class Handle {
     let by = (drag.turns ? Math.atan2(sines[drag.axis], cosine) : shifts[drag.axis]) - drag.raw;
     // A ring can be turned by more than half a circle.
     if (drag.turns) by -= 2 * Math.PI * Math.round(by / (2 * Math.PI));
-    const step = drag.turns ? STEPS.turn : STEPS.move;
+    const [step, length] = [drag.turns ? STEPS.turn : STEPS.move, drag.lengths[drag.axis]];
     drag.raw += by;
     drag.value += this.#pointer.fine ? FINE * by : by;
-    drag.shown = this.#pointer.snaps ? step * Math.round(drag.value / step) : drag.value;
+    drag.shown = this.#pointer.snaps ? step * Math.round((drag.value + length) / step) - length : drag.value;
     if (drag.shown !== drag.raw) put(now, drag);
     else drag.drawn = now.elements.join();
     this.#draw();
@@ -223,15 +224,20 @@ export class Handle {
     if (!drag || drag.axis === null) return;
     const { clearance } = this.#store.live ?? {};
     const near = clearance ? `\n${clearance.distance.toFixed(1)} mm to the ${clearance.parts[1]}` : "";
-    const number = signed(drag.shown * (drag.turns ? DEGREES : 1000));
-    const plus = /^[1-9]|^0\.[1-9]/.test(number) ? "+" : "";
+    const number = signed((drag.shown + drag.lengths[drag.axis]) * (drag.turns ? DEGREES : 1000));
+    const plus = /^[1-9]|^0\.[1-9]/.test(number) && !drag.name.endsWith(SIZE) ? "+" : "";
     write(this.#label, `${nameOf(drag, drag.axis)} ${plus}${number}${drag.turns ? "°" : " mm"}${near}`);
     placeBeside(this.#label, this.#scene, this.#pointer.pixel, this.#pointer.touch);
   }
 }
 
+/** Return the lengths [m] of the box at whose corner a handle of this pose is, from the middle of its underside; 0 for another. @param {string} name @param {Three.Matrix4} pose */
+const lengthsOf = (name, { elements: e }) =>
+  [2, 2, 1].map((sides, k) => (name.endsWith(SIZE) ? sides * (e[12] * e[4 * k] + e[13] * e[4 * k + 1] + e[14] * e[4 * k + 2]) : 0));
+
 /** Return the word for what a drag changes. @param {Drag} drag @param {number} axis */
 function nameOf({ name, turns }, axis) {
   const ring = name.slice(name.lastIndexOf("/") + 1);
-  return turns ? (RINGS.includes(ring) ? ring : `about ${AXES[axis]}`) : AXES[axis];
+  if (turns) return RINGS.includes(ring) ? ring : `about ${AXES[axis]}`;
+  return name.endsWith(SIZE) ? `size ${AXES[axis]}` : AXES[axis];
 }

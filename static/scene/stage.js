@@ -174,7 +174,8 @@ export class Stage {
   #objectOf(shape) {
     const { node, owner } = sceneIn(this.#scene);
     const [objects, more] = [OBJECTS.map(node), node(MORE)];
-    return owner(shape, (part) => objects.includes(part) || (more !== undefined && part.parent === more));
+    // viser has a group of its own round each node.
+    return owner(shape, (part) => objects.includes(part) || (more !== undefined && part.parent?.parent === more));
   }
 
   // Highlight the object under the pointer, or the selected one.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -241,8 +242,36 @@ def test_zone_is_added_in_the_sheet(page: ViserPage, reader: Client, artefacts: 
     form.get_by_label("Zone").select_option("The arm is slow")
     page.wait_until(lambda: objects(reader)["zone 1"].zone == "slow", "the rule")
     page.keep(artefacts / "zone.png")
-    form.get_by_role("button", name="Remove", exact=True).click()
-    page.wait_until(lambda: "zone 1" not in objects(reader), "it to go")
+    size.fill("200 200 200")
+    size.press("Enter")
+    page.wait_until(lambda: objects(reader)["zone 1"].size[0] == 0.2, "the former size")
+    drawn = "() => Object.keys(__viserMutable.nodeRefFromName)"
+    second = re.compile(r"/objects/\d+/shape")
+    before = len(list(filter(second.match, page.frame.evaluate(drawn))))
+    page.page.click("#add-plane")
+    page.wait_until(
+        lambda: len(list(filter(second.match, page.frame.evaluate(drawn)))) > before, "the plane"
+    )
+    # The nearer one of two is not taken for the one that is clicked.
+    page.page.mouse.click(*page.project(np.array((0.3, 0.45, 0.5))))
+    page.wait_until(lambda: page.page.inner_text("#selection b") == "plane 1", "the plane")
+    page.wait_ready(("/handles/plane%201/turn",))
+    page.page.mouse.click(*page.project(np.array((0.36, 0.0, 0.05))))
+    page.wait_ready(("/handles/zone%201/size",))
+    with page.grip_arrow("/handles/zone%201/size", "x") as grip:
+        page.page.keyboard.down("Control")
+        grip.sweep(0.048, 6)
+        label = page.page.locator("#handle-label")
+        page.wait_until(lambda: label.inner_text().startswith("size x 250.0 mm"), "the size")
+        page.keep(artefacts / "zone-size.png")
+    page.page.keyboard.up("Control")
+    page.wait_until(lambda: abs(objects(reader)["zone 1"].size[0] - 0.25) < 1e-6, "the size")
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: objects(reader)["zone 1"].size[0] == 0.2, "the former size")
+    for name in ("plane 1", "zone 1"):
+        form.get_by_label("Object").select_option(name)
+        form.get_by_role("button", name="Remove", exact=True).click()
+    page.wait_until(lambda: not {"plane 1", "zone 1"} & objects(reader).keys(), "both to go")
     page.press_in_bar("Objects")
 
 

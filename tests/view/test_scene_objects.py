@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +18,7 @@ from hypothesis import strategies as st
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.environment import Environment
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.scene_objects import MIN_SIZE, SceneObject, Shape, Zone
 from katana450.arm.control.state.solid import ObjectAppearance
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.object_meshes import Mesh, Meshes
@@ -26,6 +27,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import drawn, glb
 from katana450.extensions.importers.formats.mesh_file import read_mesh
 from katana450.extensions.objects.handles import HandlesLayer
+from katana450.maths.geometry import se3, so3
 from katana450.maths.water.environment import TableTop
 from katana450.server.view.layer import LayerContext
 from katana450.server.view.scene import COAT_THICKNESS, DETAIL, coarse, surface
@@ -165,6 +167,40 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
     assert len(put) == 2
     assert "nothing carries it there" in shown[0]
     assert tuple(nodes._handles["cup"].position) == (0.74, 0.1, 0.0)
+
+
+def test_corner_of_a_box_changes_its_size_and_rings_turn_a_plane(
+    server: viser.ViserServer, session: Session
+) -> None:
+    gestures, nodes = RecordedGestures(), HandlesLayer()
+    arm: Any = None
+    around: Any = SimpleNamespace(environment=Environment(None, None, None))
+    nodes.attach(LayerContext(server, arm, around, arm, gestures))
+    T = se3.from_rotation_translation(so3.rotation_z(np.pi / 2.0), (0.4, 0.1, 0.2))
+    zone = SceneObject("zone", Shape.BOX, (0.2, 0.3, 0.1), T, scale=2.0, zone=Zone.KEEP_OUT)
+    plane = SceneObject("wall", Shape.PLANE, (0.8, 0.6), T, zone=Zone.KEEP_OUT)
+    nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), zone, plane))
+    corner = nodes._second["zone"]
+    np.testing.assert_allclose(corner.position, (-0.3, 0.2, 0.2), atol=1e-9)
+    np.testing.assert_allclose(nodes._handles["zone"].position, (0.4, 0.1, 0.2), atol=1e-9)
+
+    def drag(act: Any, **target: Any) -> SceneObject:
+        for phase in ("start", "end"):
+            event: Any = SimpleNamespace(phase=phase, target=SimpleNamespace(**target), client_id=1)
+            act(event)
+        command = gestures.commands[-1]
+        assert isinstance(command, cmd.PlaceObject)
+        return command.scene_object
+
+    # Its own x axis points along y: the corner moves by 0.1 m along x and by 0.05 m up.
+    larger = drag(partial(nodes._resized, "zone"), position=np.array((-0.3, 0.3, 0.25)))
+    np.testing.assert_allclose(larger.extent, (0.5, 0.6, 0.25), atol=1e-9)
+    np.testing.assert_allclose(larger.T[:3, 3], (0.4, 0.15, 0.2), atol=1e-9)
+    smallest = drag(partial(nodes._resized, "zone"), position=np.array((-0.3, -5.0, 0.2)))
+    assert smallest.extent[0] == MIN_SIZE
+    turned = drag(partial(nodes._turned, "wall"), wxyz=np.array((0.0, 1.0, 0.0, 0.0)))
+    np.testing.assert_allclose(turned.T[:3, :3], np.diag((1.0, -1.0, -1.0)), atol=1e-9)
+    np.testing.assert_allclose(turned.T[:3, 3], T[:3, 3])
 
 
 @settings(max_examples=30)
