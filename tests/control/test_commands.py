@@ -112,7 +112,7 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
         *(cmd.Follow(plan_to(arm, None, state, q)), cmd.PlaceObject(BALL)),
         *(cmd.Attach("ball", Attachment.WORLD), cmd.ReplaceScene((BALL,))),
         *(cmd.SetAppearance("ball", AppearanceTrait.CHOICE, 0), cmd.OperateArm(ArmAct.UNBLOCK)),
-        cmd.Batch((cmd.Home(),)),
+        *(cmd.Batch((cmd.Home(),)), cmd.RestoreState(state)),
     ]
     kinds: dict[Any, Any] = {type(command): command for command in commands}
     return [kinds.get(kind) or plain_example(kind) for kind in KINDS]

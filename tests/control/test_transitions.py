@@ -124,10 +124,10 @@ def test_table_covers_every_command_and_mode() -> None:
         assert row_of(kind) in TABLE.values()
     assert all(any(issubclass(kind, row) for kind in COMMANDS) for row in TABLE)
     assert set(BEGINNINGS) == set(typing.get_args(Mode)) == {*MODES, Leaving}
-    for row in TABLE.values():
+    for kind, row in TABLE.items():
         assert set(row.effects) == set(MODES)
         supersedes = Effect.SUPERSEDES in row.effects.values()
-        assert supersedes == (row.begins is not None)
+        assert supersedes == (row.begins is not None or kind is cmd.RestoreState)
 
 
 def trace(state: State) -> tuple[object, ...]:
@@ -166,7 +166,8 @@ def test_each_command_has_its_effect_in_each_mode(
         case Effect.CONTINUES:
             assert type(after.intent) in {type(before.intent), row.begins, Positioning}
         case Effect.SUPERSEDES:
-            assert type(after.intent) is row.begins
+            restored = isinstance(command, cmd.RestoreState)
+            assert type(after.intent) is (type(before.intent) if restored else row.begins)
         case Effect.REFUSED:
             assert trace(after) == trace(ticked(shipped, before))
             assert type(after.intent) is type(before.intent)

@@ -9,7 +9,7 @@ from msgspec import Meta
 from katana450.arm.control.commands.act import Command, MotionRequest, Name, Request, Traits
 from katana450.arm.control.commands.checked import check_finite
 from katana450.arm.control.state.arm_report import ArmAct
-from katana450.arm.control.state.state import Finding
+from katana450.arm.control.state.state import Finding, State
 from katana450.errors import InputError
 from katana450.maths.planning.plan import Plan
 
@@ -126,6 +126,18 @@ class Follow(Command, frozen=True, eq=False):
             raise InputError(f"`tau` must be from 0 to below {self.plan.span:g}, not {self.tau!r}.")
 
 
+class RestoreState(Command, frozen=True, eq=False):
+    """Continue from ``state``, one of an earlier run of the same robot, at the present time."""
+
+    traits: ClassVar[Traits] = Traits(joints_only=True)
+
+    state: State
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.state, State):
+            raise InputError(f"`state` must be a State, not {self.state!r}.")
+
+
 class Batch(Command, frozen=True, eq=False):
     """Execute several commands in one tick: all of them, or none if one is invalid."""
 
@@ -134,8 +146,10 @@ class Batch(Command, frozen=True, eq=False):
     commands: tuple[Command, ...]
 
     def __post_init__(self) -> None:
-        if any(isinstance(command, Batch) for command in self.commands):
-            raise InputError("A batch cannot contain another batch: list its commands singly.")
+        if any(isinstance(command, Batch | RestoreState) for command in self.commands):
+            raise InputError(
+                "A batch cannot contain another batch or a state to restore: give them singly."
+            )
 
     @property
     def parts(self) -> tuple[Command, ...]:

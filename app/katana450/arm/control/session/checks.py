@@ -90,6 +90,8 @@ def check(
             raise InputError(f"This arm has {n} joints, but the command has {q.size}.")
         case cmd.Tool(name=name):
             arm.chain_to(name)
+        case cmd.RestoreState(state=state):
+            arm.chain_to(state.tool)
         case cmd.Follow(plan=plan):
             chains = [segment.path.chain for segment in plan.segments]
             if any(not np.array_equal(chain.S, arm.chain.S) for chain in chains):
@@ -196,6 +198,9 @@ def take_all(
         if why:
             return state, refused(why)
         after = take(state, command)
+        if isinstance(command, cmd.RestoreState):
+            # Its findings are of its own time.
+            return after, ACCEPTED
         command_outcome = outcome(state, after)
         if command_outcome.verdict is Verdict.REFUSED:
             # A plan that begins elsewhere. It leaves no trace but the finding that says so.
@@ -216,6 +221,8 @@ def refusal(state: State, command: cmd.Command) -> str:
     match command:
         case cmd.ClearStop(known=newest, t=t):
             return clear_refusal(state, max(t, state.t), newest)
+        case cmd.RestoreState() if state.report is not None:
+            return "A real arm cannot be set back. Move it to that posture by Run again."
         case cmd.OperateArm() if state.report is None:
             return "This arm is simulated: it has no connection, calibration or motors to operate."
         case cmd.OperateArm() if state.stopped is None or state.moving:

@@ -31,6 +31,7 @@ from katana450.arm.control.session.goals import (
     without_finding,
 )
 from katana450.arm.control.session.motion_stepper import MotionStepper, Travel, no_travel
+from katana450.arm.control.session.restoring import check_restored, restored
 from katana450.arm.control.session.slow_zones import SLOW_SPEED, SlowZones, with_slow_zone
 from katana450.arm.control.session.stopping import stopped_again, with_presses
 from katana450.arm.control.session.supervision import (
@@ -170,6 +171,8 @@ class Session:
 
     def check(self, command: cmd.Command) -> None:
         """Raise InputError if this robot does not support ``command``."""
+        if isinstance(command, cmd.RestoreState):
+            check_restored(self._limits, command.state)
         if isinstance(self._robot, JointSet):
             check_joints(self._robot, self.environment, command)
         else:
@@ -195,6 +198,9 @@ class Session:
                 newest = len(outcomes), state
             state, command_outcome = take_all(self._take, state, with_time(command, t))
             outcomes.append(command_outcome)
+            if isinstance(command, cmd.RestoreState) and command_outcome is ACCEPTED:
+                # Nothing has moved or changed from the state before to this one.
+                before = state
         if isinstance(state.intent, Tracking):
             state = tool_targets.tracked(self.require_arm(), state, state.intent)
             if newest is not None and outcomes[newest[0]] is ACCEPTED:
@@ -315,6 +321,8 @@ class Session:
                 return self._aim(state, command.targets(state.goal))
             case cmd.Joints(q=q):
                 return self._aim(state, q)
+            case cmd.RestoreState(state=earlier):
+                return restored(earlier, state.t)
             case cmd.Servo(q=q, gripper=fingers):
                 aimed = self._aim(state, q)
                 aimed = aimed if fingers is None else self._grip(aimed, fingers)

@@ -45,7 +45,8 @@ class Row:
     """The effects of one command.
 
     Attributes:
-        begins: the mode that the command begins where it supersedes; None if it never does.
+        begins: the mode that the command begins where it supersedes; None if it never does, or if
+            that is the mode of a state that it brings.
         effects: the effect in each mode.
     """
 
@@ -74,6 +75,8 @@ TABLE: Mapping[type[cmd.Command], Row] = {
     cmd.TurnElbow: _row(Jogging,       S,   S,   S,   C,   S,   S),
     cmd.Servo: _row(Servoing,          S,   S,   S,   S,   C,   S),
     cmd.Follow: _row(Following,        S,   S,   S,   S,   S,   S),
+    # The mode is that of the restored state.
+    cmd.RestoreState: _row(None,       S,   S,   S,   S,   S,   S),
     cmd.Stop: _row(Idle,               S,   S,   S,   S,   S,   S),
     cmd.ClearStop: _row(Idle,          S,   S,   S,   S,   S,   S),
     # A jog ends along its twist, as without renewal.

@@ -25,7 +25,7 @@ from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.pipes.guarded_pipe import GuardedPipe
 from katana450.arm.runtime.pipes.state_publisher import LoopTiming, Snapshot, TicketOutcome
-from katana450.arm.runtime.pipes.wire import PlanNames
+from katana450.arm.runtime.pipes.wire import PlanNames, plan_of
 from katana450.arm.runtime.readiness import writable
 from katana450.errors import InputError
 
@@ -159,8 +159,9 @@ class ArmEnd:
             self._mailbox.put(cmd.Stop())
 
     def _put(self, message: CommandMessage) -> None:
-        if isinstance(message.command, cmd.Follow):
-            self._names.note(message.number, message.command.plan)
+        plan = plan_of(message.command)
+        if plan is not None:
+            self._names.note(message.number, plan)
         with self._numbering:
             try:
                 moves = not all(part.traits.while_stopped for part in message.command.parts)

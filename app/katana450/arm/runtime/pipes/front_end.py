@@ -20,7 +20,7 @@ from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.pipes.arm_end import PULSE, CommandMessage, Heartbeat, StateMessage
 from katana450.arm.runtime.pipes.guarded_pipe import PIPE_ERRORS, GuardedPipe
 from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
-from katana450.arm.runtime.pipes.wire import PlanStore
+from katana450.arm.runtime.pipes.wire import PlanStore, plan_of
 from katana450.arm.runtime.readiness import readable, writable
 from katana450.errors import InputError
 
@@ -125,8 +125,9 @@ class FrontEnd:
                     f"The arm's process has not answered for {age:.1f} s: only STOP is accepted."
                 )
             number = self._number = self._number + 1
-            if isinstance(command, cmd.Follow):
-                self._plans.note(number, command.plan)
+            plan = plan_of(command)
+            if plan is not None:
+                self._plans.note(number, plan)
             # Read before the command is sent: afterwards the arm may move already.
             state = self.state_publisher.snapshot.state
             self._unsent.append(CommandMessage(number, command, actor, state.t))

@@ -11,12 +11,23 @@ import io
 import pickle
 from typing import Any
 
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.solid import Solid
 from katana450.maths.planning.plan import Plan
 
 MAX_NAMED_PLANS, MAX_STORED_PLANS = 8, 32
 """Number of plans that the arm's end (8) and the front end (32) remember. The end that names the
 plans keeps fewer than the end that looks the names up."""
+
+
+def plan_of(command: cmd.Command) -> Plan | None:
+    """Return the plan that ``command`` makes the arm follow; None if there is none."""
+    match command:
+        case cmd.Follow(plan=plan):
+            return plan
+        case cmd.RestoreState(state=state) if state.following is not None:
+            return state.following.plan
+    return None
 
 
 class PlanNames:
