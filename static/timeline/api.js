@@ -25,6 +25,9 @@ export const show = (query) => post(`${API}/show?${queryOf(query)}`);
 /** @param {string} page @returns {Promise<void>} */
 export const hide = (page) => post(`${API}/hide?page=${page}`);
 
+/** Let the arm continue from a moment. @param {Record<string, string | number>} query @returns {Promise<{ ticket: number }>} */
+export const restore = (query) => post(`${API}/restore?${queryOf(query)}`);
+
 /** Return {t, joints, slides, tool} of two recordings. @param {Record<string, string | number>} query @returns {Promise<Difference>} */
 export const difference = (query) => answered(`${API}/difference?${queryOf(query)}`);
 

@@ -6,7 +6,7 @@ import { clock } from "../page/words.js";
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const EXPORTS = [["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["html", "HTML page"], ["mp4", "MP4 film"]];
 /** The words of each kind of mark. @type {Record<string, string>} */
-const KINDS = { stop: "Stop", clear_stop: "Stop cleared", driver: "Driver", program: "Script", step: "Motion", contact: "Contact", limit: "Limit", episode: "Episode" };
+const KINDS = { stop: "Stop", clear_stop: "Stop cleared", driver: "Driver", program: "Script", step: "Motion", restore: "Continuation", contact: "Contact", limit: "Limit", episode: "Episode" };
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
 
 /** @param {keyof typeof ICONS} name */
@@ -23,7 +23,7 @@ const titled = (label, act, ...content) => button(content.length ? content : lab
 
 /**
  * What the buttons do.
- * @typedef {Record<"play" | "again" | "live" | "fold" | "save" | "verify", () => void>} Acts
+ * @typedef {Record<"play" | "again" | "live" | "restore" | "fold" | "save" | "verify", () => void>} Acts
  */
 
 export class Controls {
@@ -52,7 +52,8 @@ export class Controls {
     this.speed.value = "1";
     const back = titled("Back to live", acts.live);
     back.className = "main";
-    this.past.append(html("p", { role: "status" }, this.pastWords, this.moment, ", arm is elsewhere"), back);
+    const restore = titled("Continue the run from this moment: the arm, the objects and the water are set back to it", acts.restore, "Go on from here");
+    this.past.append(html("p", { role: "status" }, this.pastWords, this.moment, ", arm is elsewhere"), restore, back);
     const fold = titled("Fold the timeline away", acts.fold, "×");
     fold.className = "fold";
     const track = html("div", { class: "track" }, this.marks, this.now, this.begin, this.end);

@@ -57,6 +57,7 @@ export class Timeline {
       fold,
       play: () => this.#play(this.#playing === null),
       live: () => this.live(),
+      restore: () => this.#restore(),
       again: () => this.#again(),
       save: () => this.#selection.save(this.#selected()),
       verify: () => this.#selection.process(this.#selected(), "verify", "Verify"),
@@ -128,6 +129,18 @@ export class Timeline {
     this.#grow(this.#pinned);
     api.hide(this.#page.name).catch(() => {});
     this.#draw();
+  }
+
+  /** Let the arm continue from the moment that is shown. */
+  async #restore() {
+    const moment = { page: this.#page.name, of: this.#of, t: this.#t ?? 0, revocations: this.#page.store.status?.revocations ?? 0 };
+    try {
+      await api.restore(moment);
+      this.live();
+      this.#page.toast(`The arm continues from ${timeInWords(moment.t)}.`);
+    } catch (error) {
+      this.#page.toast(messageOf(error));
+    }
   }
 
   /** A request of this window, which moves what is seen. @param {Api.Act} request */

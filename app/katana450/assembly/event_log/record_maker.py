@@ -20,6 +20,7 @@ from katana450.arm.control.commands.act import Act, Command, content_names
 from katana450.arm.control.lease import SERVER, Actor, CommandChannel
 from katana450.arm.control.state.findings import LogEntry
 from katana450.arm.control.state.messages import finding_text
+from katana450.arm.control.state.state import State
 from katana450.maths.planning.plan import Plan
 from katana450.server.service.limits import SenderBuckets, TokenBucket
 from katana450.server.service.recorder import Note
@@ -243,9 +244,12 @@ def content_of(what: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return ``value`` made of the types of JSON; of a plan its duration alone."""
-    if isinstance(value, Plan):
-        return {"seconds": value.duration}
+    """Return ``value`` made of the types of JSON; of a plan its duration, of a state its time."""
+    match value:
+        case Plan():
+            return {"seconds": value.duration}
+        case State():
+            return {"t": value.t}
     return msgspec.to_builtins(value, enc_hook=_described, str_keys=True)
 
 

@@ -127,11 +127,17 @@ class Follow(Command, frozen=True, eq=False):
 
 
 class RestoreState(Command, frozen=True, eq=False):
-    """Continue from ``state``, one of an earlier run of the same robot, at the present time."""
+    """Continue from ``state``, one of an earlier run of the same robot, at the present time.
+
+    Attributes:
+        state: the state, with the time of its own run.
+        recording: name of the recording that has it; empty if none has.
+    """
 
     traits: ClassVar[Traits] = Traits(joints_only=True)
 
     state: State
+    recording: str = ""
 
     def __post_init__(self) -> None:
         if not isinstance(self.state, State):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.state.modes import Jogging, Leaving, Mode, Servoing
+from katana450.arm.control.state.modes import Following, Intent, Jogging, Leaving, Mode, Servoing
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.maths.motion.limiter import Limits
@@ -66,10 +66,17 @@ def restored(state: State, t: float) -> State:
 def _later(mode: Mode, by: float) -> Mode:
     """Return ``mode`` with all its times later by ``by`` [s]."""
     match mode:
+        case Following():
+            return mode
+        case Leaving(along=along, then=then):
+            return Leaving(along, _intent_later(then, by))
+    return _intent_later(mode, by)
+
+
+def _intent_later(intent: Intent, by: float) -> Intent:
+    match intent:
         case Jogging():
-            return replace(mode, until=mode.until + by)
+            return replace(intent, until=intent.until + by)
         case Servoing(stream=stream):
             return Servoing(replace(stream, times=stream.times + by))
-        case Leaving(then=Jogging() | Servoing() as then):
-            return replace(mode, then=_later(then, by))
-    return mode
+    return intent

@@ -257,8 +257,8 @@ class MessageWriter:
         self._file.flush()
 
 
-CHECKPOINT_PERIOD = 10.0
-"""[s] Time between two complete states: a simulation from one to any moment takes a second."""
+CHECKPOINT_PERIOD = 2.0
+"""[s] Time between two complete states: a simulation from one to any moment takes 0.2 s."""
 
 
 class RecordingWriter:

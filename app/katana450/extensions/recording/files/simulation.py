@@ -10,7 +10,7 @@ import math
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -278,6 +278,48 @@ MOMENT = 1e-6
 """[s] Time that is less than any between two ticks."""
 
 
+def recorded_input(
+    file: RecordingFile, start: float, end: float
+) -> Iterator[State | TickInput | TickMessage]:
+    """Yield the complete states, the ticks, and the notes that ticks are missing, in their order.
+
+    They begin with the last complete state before ``start`` and end at ``end`` [s]. Raises
+    InputError for a damaged recording.
+    """
+    reader = TickReader()
+    for message in file.messages(PLANS, SOLIDS, end=end):
+        reader.add_shared(message)
+    first = file.last_before(CHECKPOINTS, start) if math.isfinite(start) else None
+    begin = -math.inf if first is None else first.t - MOMENT
+    for message in file.messages(COMMANDS, CHECKPOINTS, start=begin, end=end):
+        is_complete = message.topic == CHECKPOINTS
+        yield reader.checkpoint(message) if is_complete else reader.tick(message)
+
+
+def state_after(session: Session, tick_inputs: Sequence[State | TickInput | TickMessage]) -> State:
+    """Return the state after the last tick of ``tick_inputs``, as in ``recorded_input``.
+
+    Raises InputError if it is not known, or is not the recorded one to the bit.
+    """
+    state: State | None = None
+    last: TickInput | None = None
+    for tick in tick_inputs:
+        if isinstance(tick, State):
+            state, last = tick, None
+        elif isinstance(tick, TickMessage):
+            state = last = None
+        elif state is not None:
+            state, last = after(session, state, tick), tick
+    if state is None:
+        raise InputError("This moment is not recorded completely. Choose a later one.")
+    if last is not None and Digester().digest(state) != last.digest:
+        raise InputError(
+            "This moment cannot be simulated exactly: it was recorded by another version, or on a "
+            "processor that rounds otherwise. Choose the start of the recording."
+        )
+    return state
+
+
 def simulated_states(
     file: RecordingFile,
     session: Session,
@@ -298,22 +340,16 @@ def simulated_states(
         lost: called with the number of ticks that cannot be simulated. Each complete state is taken
             then, also after ticks that rules of another version refuse. None raises their errors.
     """
-    reader = TickReader()
-    for message in file.messages(PLANS, SOLIDS, end=end):
-        reader.add_shared(message)
-    first = file.last_before(CHECKPOINTS, start) if math.isfinite(start) else None
     state: State | None = None
     started = False
-    begin = -math.inf if first is None else first.t - MOMENT
-    for message in file.messages(COMMANDS, CHECKPOINTS, start=begin, end=end):
-        if message.topic == CHECKPOINTS:
+    for tick in recorded_input(file, start, end):
+        if isinstance(tick, State):
             if state is not None and lost is None:
                 continue
-            state, started = reader.checkpoint(message), True
+            state, started = tick, True
             check_fits(session, state)
             yield state
             continue
-        tick = reader.tick(message)
         if isinstance(tick, TickMessage):
             missing, state = tick.ticks, None
         elif state is None:

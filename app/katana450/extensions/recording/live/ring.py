@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from katana450.arm.control.commands.commands import RestoreState
 from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.state.findings import entries_between
 from katana450.arm.control.state.modes import Following
@@ -41,7 +42,7 @@ RETRY_SECONDS = 5.0
 
 log = logging.getLogger(__name__)
 
-STOP, CLEAR_STOP, DRIVER, STEP = "stop", "clear_stop", "driver", "step"
+STOP, CLEAR_STOP, DRIVER, STEP, RESTORE = "stop", "clear_stop", "driver", "step", "restore"
 """Kinds of these events."""
 
 
@@ -61,6 +62,8 @@ class RunEvents:
             if actor.name != self._driver:
                 self._driver = actor.name
                 yield DRIVER, {"name": actor.name, "channel": actor.channel.value}
+            if isinstance(command, RestoreState):
+                yield RESTORE, {"recording": command.recording, "since": command.state.t}
         before, self._before = self._before, record.state
         if before is None:
             return

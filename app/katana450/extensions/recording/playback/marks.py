@@ -32,7 +32,8 @@ WITHOUT_MARK = frozenset((Reason.STOPPED, Reason.PAUSED, Reason.WAITING))
 class Mark(NamedTuple):
     """A mark at ``t`` [s].
 
-    Its ``kind`` is stop, clear_stop, driver, program, step, contact, limit or episode.
+    Its ``kind`` is stop, clear_stop, driver, program, step, restore, contact, limit or
+    episode.
     """
 
     t: float
@@ -80,6 +81,8 @@ def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
             return kind, "Stop cleared"
         case ring.DRIVER if form.get("channel") != CommandChannel.PROGRAM.value:
             return kind, f"{form.get('name')} drives"
+        case ring.RESTORE:
+            return kind, _restored(form)
         case "program":
             return _program(form)
         case ring.STEP:
@@ -90,6 +93,15 @@ def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
             return _finding(form)
         case _:
             return None
+
+
+def _restored(form: Mapping[str, Any]) -> str:
+    t, since = form.get("t"), form.get("since")
+    if not (isinstance(t, int | float) and isinstance(since, int | float)):
+        return "Continues from another moment"
+    if form.get("recording") != "ring":
+        return f"Continues from {since:.1f} s of a file"
+    return f"Continues from {t - since:.1f} s earlier"
 
 
 def _program(form: Mapping[str, Any]) -> tuple[str, str] | None:

@@ -17,8 +17,11 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
+from katana450.arm.control.commands.commands import RestoreState
 from katana450.arm.control.lease import CommandChannel
-from katana450.errors import InputError
+from katana450.arm.control.state.state import State
+from katana450.errors import InputError, LeaseError
+from katana450.extensions.recording.files.simulation import state_after
 from katana450.extensions.recording.messages import StateRow
 from katana450.extensions.recording.playback.drawing import CONTEXTS, PlaybackWindows
 from katana450.extensions.recording.playback.rows import RecordedMoment
@@ -130,6 +133,7 @@ class PlaybackRoutes:
             Route(path, self._open, methods=["POST"]),
             Route(f"{path}/show", self._show, methods=["POST"]),
             Route(f"{path}/hide", self._hide, methods=["POST"]),
+            Route(f"{path}/restore", self._restore, methods=["POST"]),
             Route(f"{path}/difference", self._difference),
             Route(f"{path}/{{name}}", self._timeline),
         ]
@@ -175,6 +179,30 @@ class PlaybackRoutes:
             return Response(status_code=HTTPStatus.NO_CONTENT)
 
         return await asyncio.to_thread(hide)
+
+    async def _restore(self, request: Request) -> Response:
+        """Let the arm of this server continue from a recorded moment, for the window that asks."""
+        query = request.query_params
+        self._context.driver(request, "set the arm back")
+        name = query.get("of", RING)
+        run, t = self._run(request, name), _number(query.get("t"))
+        _, key = self._window(request)
+        hub = self._context.hub
+        revocations = hub.gate.revocations
+
+        def simulate() -> State:
+            run.update()
+            if self._is_of_another_robot(run):
+                raise InputError("The recording is of another robot, whose states do not fit.")
+            return state_after(hub.present().session, run.input_until(t))
+
+        state = await self._in_thread(simulate)
+        try:
+            actor = hub.at_scene(key, int(query.get("revocations", revocations)))
+            ticket = hub.gate.submit(RestoreState(state, name), actor)
+        except (LeaseError, InputError) as error:
+            raise HTTPException(HTTPStatus.CONFLICT, str(error)) from error
+        return _json({"ticket": ticket})
 
     async def _difference(self, request: Request) -> Response:
         """Return the difference of two recordings over one clock."""

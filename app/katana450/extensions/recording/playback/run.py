@@ -9,9 +9,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import ChunkSpan, Message, RecordingFile
-from katana450.extensions.recording.files.simulation import TickReader, content_of
+from katana450.extensions.recording.files.simulation import (
+    TickReader,
+    content_of,
+    recorded_input,
+)
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     EPISODES,
@@ -19,6 +24,7 @@ from katana450.extensions.recording.messages import (
     SOLIDS,
     STATE,
     StateRow,
+    TickMessage,
 )
 from katana450.extensions.recording.playback.marks import Mark, add_marks
 from katana450.extensions.recording.playback.rows import (
@@ -27,6 +33,7 @@ from katana450.extensions.recording.playback.rows import (
     RecordedMoment,
     description,
 )
+from katana450.extensions.recording.ticks import TickInput
 
 MAX_PAUSE = 2.0
 """[s] Time without a record from which on a new span begins."""
@@ -79,11 +86,11 @@ def length_of(spans: Iterable[Span]) -> float:
     return sum(span.length for span in spans)
 
 
-MAX_BLOCKS = 24
-"""Number of decoded blocks that are kept, 4 min of motion; each has about 1 MB."""
+MAX_BLOCKS = 120
+"""Number of decoded blocks that are kept, 4 min of motion; each has about 0.2 MB."""
 
 MAX_BLOCK_BYTES = 32_000_000
-"""Maximum memory of the states of a block [bytes]; one of 10 s of motion takes about 2 MB."""
+"""Maximum memory of the states of a block [bytes]; one of 2 s of motion takes about 0.4 MB."""
 
 STATE_BYTES = 1000
 """Memory of a state besides its message [bytes]."""
@@ -209,6 +216,18 @@ class PlaybackRun:
                     return moment
                 first = block
             return None if first is None else first.at(first.start)
+
+    def input_until(self, t: float) -> list[State | TickInput | TickMessage]:
+        """Return what the state at ``t`` [s] is simulated from, as ``state_after`` takes it.
+
+        Raises InputError for a damaged file, and before the first complete state.
+        """
+        with self._lock:
+            t -= self._offset
+            for file in reversed(self._files):
+                if file.index.last_before(CHECKPOINTS, t) is not None:
+                    return list(recorded_input(file.index, t, t))
+        raise InputError("Nothing complete is recorded before this moment. Choose a later one.")
 
     def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
         """Return joints and tool at each of ``times`` [s], without objects; None before the first.

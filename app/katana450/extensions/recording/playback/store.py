@@ -26,12 +26,14 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any, BinaryIO
 
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.recording.folders import SUFFIX, recordings_in
-from katana450.extensions.recording.messages import StateRow
+from katana450.extensions.recording.messages import StateRow, TickMessage
 from katana450.extensions.recording.playback.marks import Mark
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.run import PlaybackRun, Span
+from katana450.extensions.recording.ticks import TickInput
 from katana450.platform_support import limit_resources, without_interrupts
 
 TIMEOUT = 30.0
@@ -85,6 +87,11 @@ class OpenedRun:
         """See ``PlaybackRun.at``."""
         moment: RecordedMoment | None = self._ask("at", t)
         return moment
+
+    def input_until(self, t: float) -> list[State | TickInput | TickMessage]:
+        """See ``PlaybackRun.input_until``."""
+        tick_inputs: list[State | TickInput | TickMessage] = self._ask("input_until", t)
+        return tick_inputs
 
     def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
         """See ``PlaybackRun.rows_at``."""
