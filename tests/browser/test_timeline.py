@@ -150,9 +150,23 @@ def test_past_is_shown_in_one_window_until_stop(
     assert any("Ada pressed STOP" in title for title in titles), titles
     assert any("Ada drives" in title for title in titles), titles
 
-    # Nothing of this concerns the arm.
+    # Nothing of this concerns the arm, until the run continues from there.
     assert truth.status()["q"] == before
+    moving = next(
+        place
+        for place in np.arange(0.0, length, 0.02).tolist()
+        if (moment := run.at(at_place(run.spans, place))) and 0.1 < moment.row.joints[0] < 0.4
+    )
+    place(page, moving)
+    page.wait_until(lambda: 0.1 < shown_turn(page) < 0.4, "the first motion")
+    page.page.get_by_text("Go on from here").click()
+    page.wait_until(lambda: page.shows(LINK) and not page.shows(GHOST), "the present")
+    truth.wait(moving=False)
+    assert truth.status()["q"][0] == pytest.approx(TURNS[0], abs=1e-6)
+    page.page.locator("#timeline .marks i[title*='Continues from']").wait_for(state="attached")
 
+    place(page, 0.0)
+    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
     # Esc stops the arm, and shows it.
     page.page.keyboard.press("Escape")
     page.wait_until(lambda: page.shows(LINK) and not page.shows(GHOST), "the present")

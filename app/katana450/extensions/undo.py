@@ -73,7 +73,7 @@ class UndoHistory:
         """
         if self.undoes:
             return
-        if isinstance(command, cmd.ReplaceScene):
+        if isinstance(command, cmd.ReplaceScene | cmd.RestoreState):
             self._changes = self._undone = ()
         inverse = _inverse(state, command)
         if inverse is None:
@@ -152,6 +152,8 @@ def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | No
             return "tool", cmd.Tool(state.tool)
         case cmd.SetPriority():
             return "priority", cmd.SetPriority(state.priority)
+        case cmd.RestoreState():
+            return "moment", cmd.RestoreState(state)
     name = _object_of(command) if isinstance(command, OBJECTS) else None
     if name is None:
         return None
