@@ -6,10 +6,8 @@ import { readState } from "../server.js";
 import { isMesh } from "./glow.js";
 
 const ROW = "tr[data-branch]";
-const EVERY = 250; // ms between two places of the name
 const OPACITY = 0.4;
 const PARTS = ["shoulder", "elbow", "wrist"]; // words of the name of a branch
-const ELBOW = 2; // number of the joint whose link carries the name
 
 export class Branches {
   #scene;
@@ -19,8 +17,8 @@ export class Branches {
   #options = new Map(); // name of a branch to its words and joint angles
   /** @type {string | null} */
   #row = null; // name of the branch under the pointer
-  /** @type {{ object: Three.Object3D, elbow: Three.Object3D | null, material: Three.Material | null } | null} */
-  #ghost = null; // {object, elbow, material} of that branch
+  /** @type {{ object: Three.Object3D, material: Three.Material | null } | null} */
+  #ghost = null; // {object, material} of that branch
   #label = html("p", { id: "branch-label", class: "scene-label", hidden: "" });
   #asked = 0; // number of the last question
 
@@ -31,7 +29,6 @@ export class Branches {
     this.#store = store;
     stage.append(this.#label);
     this.#read();
-    setInterval(() => document.hidden || this.#name(), EVERY);
   }
 
   /** @param {Window} inner */
@@ -52,7 +49,6 @@ export class Branches {
     this.#remove();
     const sign = row?.querySelector("i");
     if (name && sign) this.#show(name, getComputedStyle(sign).backgroundColor);
-    else this.#name();
   }
 
   /** @param {string} name @param {string} colour */
@@ -76,7 +72,8 @@ export class Branches {
     frame.add(copy.object);
     drawing().scene.add(frame);
     this.#ghost = { ...copy, object: frame };
-    this.#name();
+    write(this.#label, option.words);
+    this.#label.hidden = false;
     drawing().requestRender();
   }
 
@@ -85,8 +82,6 @@ export class Branches {
   #copy(source, links, turns) {
     /** @type {Three.Material | null} */
     let material = null;
-    /** @type {Three.Object3D | null} */
-    let elbow = null;
     /** @param {Three.Object3D} object */
     const copy = (object) => {
       const made = object.clone(false);
@@ -97,7 +92,6 @@ export class Branches {
         made.quaternion.multiply(made.quaternion.clone().setFromAxisAngle(axis, turns[joint]));
         made.updateMatrix();
       }
-      if (joint === ELBOW) elbow = made;
       if (isMesh(made)) {
         material ??= Object.assign(made.material.clone(), { map: null, transparent: true, opacity: OPACITY, depthWrite: false });
         made.material = material;
@@ -108,13 +102,14 @@ export class Branches {
       return made;
     };
     const object = copy(source);
-    return { object, elbow: /** @type {Three.Object3D | null} */ (elbow), material: /** @type {Three.Material | null} */ (material) };
+    return { object, material: /** @type {Three.Material | null} */ (material) };
   }
 
   #remove() {
     this.#ghost?.object.removeFromParent();
     this.#ghost?.material?.dispose();
     this.#ghost = null;
+    this.#label.hidden = true;
     sceneOf(this.#scene)?.viewer()?.requestRender();
   }
 
@@ -136,21 +131,5 @@ export class Branches {
       }),
     );
     return state;
-  }
-
-  // Write the name of the ghost at its elbow.
-  #name() {
-    const { node, pixelOf } = sceneOf(this.#scene) ?? {};
-    const world = node?.("");
-    const elbow = this.#ghost?.elbow;
-    const place = elbow?.getWorldPosition(elbow.position.clone());
-    const pixel = world && place && pixelOf?.(place.applyMatrix4(world.matrixWorld.clone().invert()).toArray());
-    const option = this.#options.get(this.#row ?? "");
-    this.#label.hidden = !pixel || !option;
-    if (!pixel || !option) return;
-    const [x, y] = pixel;
-    write(this.#label, option.words);
-    this.#label.style.left = `${x}px`;
-    this.#label.style.top = `${y}px`;
   }
 }

@@ -81,6 +81,9 @@ export class Timeline {
     page.store.follow(follow);
   }
 
+  /** @param {unknown} error */
+  #toast = (error) => this.#page.toast(messageOf(error));
+
   get open() {
     return this.#box.classList.contains("open");
   }
@@ -131,16 +134,13 @@ export class Timeline {
     this.#draw();
   }
 
-  /** Let the arm continue from the moment that is shown. */
-  async #restore() {
-    const moment = { page: this.#page.name, of: this.#of, t: this.#t ?? 0, revocations: this.#page.store.status?.revocations ?? 0 };
-    try {
-      await api.restore(moment);
+  // Let the arm continue from the moment that is shown.
+  #restore() {
+    const [t, { revocations = 0 }] = [this.#t ?? 0, this.#page.store.status ?? {}];
+    api.restore({ page: this.#page.name, of: this.#of, t, revocations }).then(() => {
       this.live();
-      this.#page.toast(`The arm continues from ${timeInWords(moment.t)}.`);
-    } catch (error) {
-      this.#page.toast(messageOf(error));
-    }
+      this.#page.toast(`The arm continues from ${timeInWords(t)}.`);
+    }, this.#toast);
   }
 
   /** A request of this window, which moves what is seen. @param {Api.Act} request */
