@@ -52,7 +52,7 @@ export class Controls {
     this.speed.value = "1";
     const back = titled("Back to live", acts.live);
     back.className = "main";
-    const restore = titled("Continue the run from this moment: the arm, the objects and the water are set back to it", acts.restore, "Go on from here");
+    const restore = titled("Continue the run from this moment: the arm, the objects and the water are set back to it", acts.restore, "Continue from here");
     this.past.append(html("p", { role: "status" }, this.pastWords, this.moment, ", arm is elsewhere"), restore, back);
     const fold = titled("Fold the timeline away", acts.fold, "×");
     fold.className = "fold";

@@ -159,7 +159,7 @@ def test_past_is_shown_in_one_window_until_stop(
     )
     place(page, moving)
     page.wait_until(lambda: 0.1 < shown_turn(page) < 0.4, "the first motion")
-    page.page.get_by_text("Go on from here").click()
+    page.page.get_by_text("Continue from here").click()
     page.wait_until(lambda: page.shows(LINK) and not page.shows(GHOST), "the present")
     truth.wait(moving=False)
     assert truth.status()["q"][0] == pytest.approx(TURNS[0], abs=1e-6)
