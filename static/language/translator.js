@@ -6,7 +6,9 @@ const { lang } = window.parent.document.documentElement;
 document.documentElement.lang = lang;
 const ATTRIBUTES = ["title", "aria-label", "placeholder", "alt", "aria-valuetext", "data-drop"];
 const KEPT = "kbd, script, style, textarea, [translate=no]";
-const HOLE = /\{\d\}/; // in a pattern; what it stands for is within one sentence
+const HOLE = /\{\d\}/; // in a pattern
+const SHORT = 12; // letters of a pattern; a value in a shorter one is a name or a number, otherwise within one sentence
+const TIME = /^\d+:[\d:]+ /; // before an event
 const GAPS = [/((?<=[.!?…]) )/, /(; )/, /( · )/, /((?<=:) )/, /(, )/, /((?<=^\d+) )/, /( – )/]; // between the parts of a text
 const MAX_SHOWN = 2000;
 
@@ -16,7 +18,8 @@ const point = new Intl.NumberFormat(lang).format(0.5)[1];
 const longest = Object.keys(catalogue).filter((key) => HOLE.test(key)).sort((one, other) => other.length - one.length);
 const patterns = longest.map((key) => {
   const literals = key.split(HOLE).map((words) => words.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"));
-  return { pattern: new RegExp(`^${literals.join("((?:(?!\\. ).)+?)")}$`), text: catalogue[key] };
+  const value = literals.join("").length < SHORT ? "((?:(?![.,:] ).)+?)" : "((?:(?!\\. ).)+?)";
+  return { pattern: new RegExp(`^${literals.join(value)}$`), text: catalogue[key] };
 });
 /** @type {Map<string, string>} */
 const shown = new Map(); // by the English text, and by the shown one
@@ -36,12 +39,15 @@ function find(words) {
 
 /** Return the translation of a text or of its parts; undefined without one. @param {string} words @returns {string | undefined} */
 function composed(words) {
+  const [time] = TIME.exec(words) ?? [];
+  if (time) return time + translated(words.slice(time.length));
   const whole = find(words);
   if (whole !== undefined) return whole;
   // A reason begins with a capital, and ends with a point, where it is a sentence.
   const [, initial, rest, end] = /^(.?)(.*?)([.,:;]?)$/.exec(words) ?? [];
   const reason = find(initial.toLowerCase() + rest);
-  if (reason !== undefined) return reason.charAt(0).toUpperCase() + reason.slice(1) + (catalogue[end] ?? end);
+  const small = initial === initial.toLowerCase();
+  if (reason !== undefined) return (small ? reason : reason.charAt(0).toUpperCase() + reason.slice(1)) + (catalogue[end] ?? end);
   for (const gap of GAPS) {
     const parts = words.split(gap);
     const texts = parts.map((part, i) => (parts.length === 1 ? undefined : i % 2 ? catalogue[part] : composed(part)));
@@ -100,7 +106,7 @@ const observer = new MutationObserver((changes) => {
   // The changes that were made here.
   observer.takeRecords();
 });
-styled("language.css", import.meta.url);
+if (window.parent === window) styled("language.css", import.meta.url);
 translate(document);
 observer.observe(document, { subtree: true, childList: true, characterData: true, attributeFilter: ATTRIBUTES });
 document.documentElement.dataset.translated = "";

@@ -17,6 +17,14 @@ CUT = """() => [...document.querySelectorAll("button, select, legend, label, h1,
     .map((each) => each.textContent)"""
 ENGLISH = """() => [...document.querySelectorAll("[lang=en]:not(option)")]
     .map((each) => each.textContent)"""
+SHOWN = {
+    "Axis 2 (shoulder) at its limit of −12.50°.": "Achse 2 (Schulter) an der Grenze von −12,50°.",
+    "13:43:22: You pressed STOP.": "13:43:22: Sie haben STOPP gedrückt.",
+    "Pour: line, step 4 of 7, 26 s left.": "Pour: Linie, Schritt 4 von 7, noch 26 s.",
+    "Nothing was saved: Anna is away.": "Nichts gespeichert: Anna is away.",
+}
+"""Words of server and page, and those that are shown in German."""
+
 STOP = {"de": "STOPP", "fr": "ARRÊT", "zh": "停止"}
 
 
@@ -47,6 +55,5 @@ def test_language_is_chosen_in_the_menu_and_kept(server: AppServer, open_page: O
     page.wait_for_selector("html[lang=de][data-translated]")
     page.wait_for_function("document.querySelector('#holder').textContent === 'Niemand steuert'")
     assert page.inner_text("#jog [name=frame] + span >> nth=0") == "Basis"
-    assert page.evaluate("translated('Axis 2 (shoulder) at its limit of −12.50°.')") == (
-        "Achse 2 (Schulter) an der Grenze von −12,50°."
-    )
+    for words, shown in SHOWN.items():
+        assert page.evaluate("(words) => translated(words)", words) == shown

@@ -34,7 +34,7 @@ CODE = re.compile(
 
 NOT_SHOWN = {"Delete", "Enter", "Escape", "Seen", "Mesh", "Start", "Update", "Del", "Files"} | {
     *("arm (drag)", "run again", "{} go", "{} kept", "{} file", "started by {}", "started by you"),
-    *("Katana450", "REC", "SpaceMouse"),
+    *("Katana450", "REC", "SpaceMouse", "Pour", "Wave", "{} of {}"),
 }
 """Names, and strings that are compared or sent."""
 
