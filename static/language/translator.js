@@ -9,7 +9,7 @@ const KEPT = "kbd, script, style, textarea, [translate=no]";
 const HOLE = /\{\d\}/; // in a pattern
 const SHORT = 12; // letters of a pattern; a value in a shorter one is a name or a number, otherwise within one sentence
 const TIME = /^\d+:[\d:]+ /; // before an event
-const GAPS = [/((?<=[.!?…]) )/, /(; )/, /( · )/, /((?<=:) )/, /(, )/, /((?<=^\d+) )/, /( – )/]; // between the parts of a text
+const GAPS = [/((?<=[.!?…]) )/, /(; )/, /( · )/, /((?<=^[^:]*:) )/, /(, )/, /((?<=^\d+) )/, /( – )/]; // between the parts of a text
 const MAX_SHOWN = 2000;
 
 /** @type {Record<string, string>} */
@@ -43,11 +43,11 @@ function composed(words) {
   if (time) return time + translated(words.slice(time.length));
   const whole = find(words);
   if (whole !== undefined) return whole;
-  // A reason begins with a capital, and ends with a point, where it is a sentence.
   const [, initial, rest, end] = /^(.?)(.*?)([.,:;]?)$/.exec(words) ?? [];
-  const reason = find(initial.toLowerCase() + rest);
-  const small = initial === initial.toLowerCase();
-  if (reason !== undefined) return (small ? reason : reason.charAt(0).toUpperCase() + reason.slice(1)) + (catalogue[end] ?? end);
+  const same = find(initial + rest);
+  // A reason begins with a capital where it is a sentence.
+  const reason = same ?? find(initial.toLowerCase() + rest);
+  if (reason !== undefined) return (same ?? reason.charAt(0).toUpperCase() + reason.slice(1)) + (catalogue[end] ?? end);
   for (const gap of GAPS) {
     const parts = words.split(gap);
     const texts = parts.map((part, i) => (parts.length === 1 ? undefined : i % 2 ? catalogue[part] : composed(part)));
@@ -71,7 +71,7 @@ function translateText(node) {
   const { data, parentElement: parent } = node;
   if (!parent || !/\p{L}{2}|\d\.\d/u.test(data) || parent.closest(KEPT)) return;
   if (parent instanceof HTMLOptionElement && !parent.hasAttribute("value")) parent.value = parent.text;
-  const words = data.trim().replace(/\s+/g, " ");
+  const words = data.trim().replace(/[ \n]+/g, " ");
   const text = translated(words);
   if (text !== words) node.data = data.replace(data.trim(), () => text);
   // A screen reader speaks a sentence without a translation as English.
