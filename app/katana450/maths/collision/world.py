@@ -212,20 +212,23 @@ class CollisionWorld:
                 hasher.update(shape.mark)
         return Fingerprint(hasher.digest(), frozen(self.T_mover_body))
 
-    def with_carried(self, carried: Part) -> CollisionWorld:
-        """Return this world with the ``carried`` part of the arm.
+    def with_carried(self, *carried: Part, on_joint: bool = False) -> CollisionWorld:
+        """Return this world with the ``carried`` parts of the arm.
 
-        It may meet every part from which more than one joint separates it. The part that holds it
-        turns with it, and the next link turns under it.
+        They may meet every part from which more than one joint separates them. The part that holds
+        them turns with them, and the next link turns under them. Parts of the ground ``on_joint``,
+        which the hand only leads, do not meet the ground.
         """
         count = len(self.parts)
         new_pairs = [
-            (number, count)
+            (number, count + k)
+            for k, new in enumerate(carried)
             for number, part in enumerate(self.parts)
-            if len(self.linkage.variables_between(part.mover, carried.mover)) > 1
+            if len(self.linkage.variables_between(part.mover, new.mover)) > 1
+            and not (on_joint and part.mover == GROUND)
         ]
         return CollisionWorld(
-            self.linkage, (*self.parts, carried), (*self.pairs, *new_pairs), self.close
+            self.linkage, (*self.parts, *carried), (*self.pairs, *new_pairs), self.close
         )
 
     def with_obstacles(self, obstacles: Sequence[Part]) -> CollisionWorld:

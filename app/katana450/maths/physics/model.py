@@ -16,6 +16,7 @@ from katana450.maths.collision.shape import CollisionShape
 from katana450.maths.collision.world import Part
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.physics.joint import BodyJoint
 from katana450.maths.water.units import GRAVITY
 
 BoolArray = npt.NDArray[np.bool_]
@@ -34,6 +35,9 @@ class RigidBody:
         T_body_shape: pose (4, 4) of each piece in the frame of the body [m].
         mass: [kg], spread evenly over the volume of the pieces.
         friction: coefficient of Coulomb friction [1]. Between two bodies the greater one counts.
+        joint: its joint with the ground; None for a free body. The frame of the body has its origin
+            at the point of the joint, and at zero the axes of the base frame.
+        owners: name of the object of each piece; none if all are those of the body.
     """
 
     name: str
@@ -41,13 +45,15 @@ class RigidBody:
     T_body_shape: tuple[FloatArray, ...]
     mass: float
     friction: float
+    joint: BodyJoint | None = None
+    owners: tuple[str, ...] = ()
 
 
 class FingerContact(NamedTuple):
     """The contact of a finger, or of the palm, with a body.
 
     Attributes:
-        finger, body: names of the part and the body.
+        finger, body: names of the part and of the object.
         force: sum of the normal forces [N].
         friction: length of the sum of the tangential forces [N].
     """
@@ -104,6 +110,24 @@ def volume(shape: CollisionShape) -> float:
     points = geometry.points
     corners = points[hull_triangles(points)]
     return float(np.abs(np.linalg.det(corners)).sum()) / 6.0
+
+
+INSIDE = 0.8
+"""[1] Radius of the inside of a body, as a ratio to half of the least extent of its first piece."""
+
+
+def radius_of(body: RigidBody) -> float:
+    """Return the radius [m] of the ball about the origin of a body that contains it."""
+    return max(
+        float(np.linalg.norm(T[:3, :3] @ shape.centre + T[:3, 3])) + shape.radius
+        for T, shape in zip(body.T_body_shape, body.shapes, strict=True)
+    )
+
+
+def inside_of(body: RigidBody) -> tuple[FloatArray, float]:
+    """Return the middle (3,) and radius [m] of a ball in the first piece of a body."""
+    shape, T = body.shapes[0], body.T_body_shape[0]
+    return T[:3, :3] @ shape.centre + T[:3, 3], 0.5 * INSIDE * float((shape.high - shape.low).min())
 
 
 STEP = 1e-3
@@ -171,7 +195,7 @@ class FingerDrive(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A compiled model. Its bodies are the free ones, then the links, then the fingers.
+    """A compiled model. Its bodies are the free ones, those on joints, the links, the fingers.
 
     Attributes:
         compiled: MuJoCo's model.
@@ -194,10 +218,11 @@ def compile_model(
     bodies: Sequence[RigidBody],
     drive: FingerDrive | None = None,
 ) -> Model:
-    """Return the model of free ``bodies`` among the ``parts`` of the arm and its environment.
+    """Return the model of ``bodies`` among the ``parts`` of the arm and its environment.
 
-    Parts on the ground stand still. The groups of the ``drive`` are moved by it, all others of the
-    ``linkage`` from outside.
+    The free bodies come before those on joints, which meet no part of the ground. That
+    stands still. The groups of the ``drive`` are moved by it, all others of the ``linkage`` from
+    outside.
     """
     import mujoco
 
@@ -212,7 +237,10 @@ def compile_model(
     builder = _Builder(spec)
     for body in bodies:
         frame = spec.worldbody.add_body()
-        frame.add_freejoint()
+        if body.joint is None:
+            frame.add_freejoint()
+        else:
+            _add_joint(frame, body.joint)
         builder.add_body(frame, body)
     frames = {GROUND: spec.worldbody}
     variable = None if drive is None else drive.variable
@@ -315,9 +343,10 @@ class _Builder:
         volumes = [volume(shape) for shape in body.shapes]
         for T, shape, size in zip(body.T_body_shape, body.shapes, volumes, strict=True):
             friction = body.friction, SPIN_FRICTION
-            geom = self._add(frame, T, shape, friction, (BODY, LINK | BODY), solid=True)
+            meets = LINK | BODY if body.joint is None else LINK
+            geom = self._add(frame, T, shape, friction, (BODY, meets), solid=True)
             geom.mass = body.mass * size / math.fsum(volumes)
-            self._owners.append(body.name)
+        self._owners += body.owners or (body.name,) * len(body.shapes)
 
     def _add(
         self,
@@ -381,6 +410,25 @@ class _Builder:
             compiled.body_conaffinity[body] |= meets
             owners[geom] = self._owners[number]
         return tuple(owners)
+
+
+def _add_joint(frame: Any, joint: BodyJoint) -> None:
+    """Let the body of ``frame`` move by ``joint``, whose friction and ends are hard contacts."""
+    import mujoco
+
+    kinds, ends = mujoco.mjtJoint, (joint.lower, joint.upper)
+    frame.pos = joint.point
+    added = frame.add_joint(
+        type=kinds.mjJNT_SLIDE if joint.slides else kinds.mjJNT_HINGE,
+        axis=joint.axis,
+        limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        range=ends if joint.slides else np.degrees(ends),
+        frictionloss=joint.friction,
+    )
+    added.damping[0] = joint.damping
+    for values, damping in ((added.solref_friction, 1.0), (added.solref_limit, CONTACT_DAMPING)):
+        values[:2] = CONTACT_TIME, damping
+    added.solimp_friction[:5] = added.solimp_limit[:5] = CONTACT_STIFFNESS
 
 
 def _shifted(T: FloatArray, origin: FloatArray) -> FloatArray:

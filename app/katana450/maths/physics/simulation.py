@@ -31,6 +31,8 @@ from katana450.maths.physics.model import (
     FingerDrive,
     RigidBody,
     compile_model,
+    inside_of,
+    radius_of,
 )
 
 SLOW = 5e-3
@@ -51,9 +53,6 @@ them without contact, because the number of contacts grows with the square of th
 
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 """[rad] Angle whose multiples are spread evenly."""
-
-INSIDE = 0.8
-"""[1] Radius of the inside of a body, as a ratio to half of the least extent of its first piece."""
 
 MANY, HEAP_STEP = 12, 2e-3
 """[1, s] Number of bodies in motion beyond which the steps are longer, so that the arm's control
@@ -123,21 +122,28 @@ class BodySimulation:
         self._exact = {name: getattr(option, name) for name in self._quick}
         self._is_quick = False
         self._names = tuple(body.name for body in bodies)
-        self._radii = np.array([_radius(body) for body in bodies])
-        self._insides = [_inside(body) for body in bodies]
+        self._joints = [body.joint for body in bodies if body.joint is not None]
+        self._free = free = len(bodies) - len(self._joints)
+        slides = np.array([joint.slides for joint in self._joints], dtype=bool)
+        self._joint_limits = np.where(slides, MAX_SPEED, 10.0 * MAX_SPEED)
+        # Where the values of the links begin.
+        self._link_q, self._link_v = 7 * free + len(self._joints), 6 * free + len(self._joints)
+        self._bodies_of = {owner: body.name for body in bodies for owner in body.owners}
+        self._radii = np.array([radius_of(body) for body in bodies])
+        self._insides = [inside_of(body) for body in bodies]
         self._resting = self._parting = np.zeros(len(bodies), dtype=bool)
         # Views of the model, the values of a body at rest, and those of the bodies themselves.
-        model, free, dofs = self._compiled, slice(1, 1 + len(bodies)), slice(0, 6 * len(bodies))
-        light = 1.0 / LINK_MASS
+        model, every = self._compiled, slice(1, 1 + len(bodies))
+        light, owner = 1.0 / LINK_MASS, model.dof_bodyid[: self._link_v] - 1
         self._masses = [
-            (view, heavy, view.copy())
-            for view, heavy in (
-                (model.body_mass[free], LINK_MASS),
-                (model.body_inertia[free], LINK_MASS),
-                (model.body_gravcomp[free], 1.0),
-                (model.body_invweight0[free], light),
-                (model.dof_invweight0[dofs].reshape(-1, 6), light),
-                (model.dof_M0[dofs].reshape(-1, 6), LINK_MASS),
+            (view, heavy, view.copy(), body)
+            for view, heavy, body in (
+                (model.body_mass[every], LINK_MASS, ...),
+                (model.body_inertia[every], LINK_MASS, ...),
+                (model.body_gravcomp[every], 1.0, ...),
+                (model.body_invweight0[every], light, ...),
+                (model.dof_invweight0[: self._link_v], light, owner),
+                (model.dof_M0[: self._link_v], LINK_MASS, owner),
             )
         ]
 
@@ -199,7 +205,7 @@ class BodySimulation:
         data, count = self._data, len(self._names)
         motion = self._with_woken(motion, dt)
         # What the fingers touch can be moved by them at any time.
-        touched = {contact.body for contact in motion.contacts}
+        touched = {self._bodies_of.get(name, name) for _, name, *_ in motion.contacts}
         resting = motion.resting & [name not in touched for name in self._names]
         many = bool(np.count_nonzero(~resting) > MANY)
         ways = dt * PARTING_SPEED * self._crowding(motion) if many else np.zeros((count, 3))
@@ -211,13 +217,12 @@ class BodySimulation:
         longest = HEAP_STEP if many else STEP
         steps = max(1, math.ceil(dt / longest - 1e-9))
         self._compiled.opt.timestep = h = dt / steps
-        q, v = data.qpos, data.qvel
-        q[: 7 * count], v[: 6 * count] = motion.place.ravel(), motion.velocity.ravel()
+        self._place_bodies(motion)
         self._place_links(x, towards, rates, dt, h)
         goals = self._drive_goals(motion, x, towards, dt, grasp, steps)
         data.qacc_warmstart[:] = motion.memory
         lost = not self._advance(goals, many=many)
-        place, velocity = q[: 7 * count].reshape(-1, 7), v[: 6 * count].reshape(-1, 6)
+        place, velocity = self._bodies()
         if lost:
             place, velocity = motion.place, np.zeros((count, 6))
             data.qacc_warmstart[:] = 0.0
@@ -251,7 +256,7 @@ class BodySimulation:
 
     def _advance(self, goals: FloatArray, *, many: bool) -> bool:
         """Let the engine make a step for each of the ``goals``; return False without a motion."""
-        data, count = self._data, len(self._names)
+        data, count = self._data, self._free
         data.time = 0.0
         data.warning.number[:] = 0
         with _silence():
@@ -302,6 +307,7 @@ class BodySimulation:
         apart = middles[:, None] - middles
         overlaps = np.linalg.norm(apart, axis=2) < radii[:, None] + radii
         crowded = (overlaps.sum(axis=1) > 1 + CROWD) & ~motion.resting
+        crowded[self._free :] = False
         # Bodies with the same middle leave it in different directions.
         angles = GOLDEN_ANGLE * np.arange(len(radii))
         ways = np.column_stack((np.cos(angles), np.sin(angles), np.ones(len(radii)))) * SLOW
@@ -326,16 +332,47 @@ class BodySimulation:
         self._resting, self._parting = resting, parting
         model = self._compiled
         bodies = np.arange(1, 1 + len(resting))
-        for values, heavy, ours in self._masses:
-            mask = (resting | parting).reshape(-1, *(1,) * (ours.ndim - 1))
+        for values, heavy, ours, body in self._masses:
+            mask = (resting | parting)[body].reshape(-1, *(1,) * (ours.ndim - 1))
             values[: len(ours)] = np.where(mask, heavy, ours)
-        meets = np.where(resting | parting, 0, LINK | BODY)
+        ours = np.where(np.arange(len(resting)) < self._free, LINK | BODY, LINK)
+        meets = np.where(resting | parting, 0, ours)
         kinds = np.where(parting, 0, BODY)
         model.body_conaffinity[bodies], model.body_contype[bodies] = meets, kinds
         owners = model.geom_bodyid
         free = (owners >= 1) & (owners <= len(resting))
         owner = owners[free] - 1
         model.geom_conaffinity[free], model.geom_contype[free] = meets[owner], kinds[owner]
+
+    def _place_bodies(self, motion: BodyMotion) -> None:
+        """Put the bodies where they are in ``motion``."""
+        q, v, free = self._data.qpos, self._data.qvel, self._free
+        q[: 7 * free], v[: 6 * free] = motion.place[:free].ravel(), motion.velocity[:free].ravel()
+        rows = zip(self._joints, motion.place[free:], motion.velocity[free:], strict=True)
+        for number, (joint, place, velocity) in enumerate(rows):
+            change = _pose_at(place)
+            change[:3, 3] -= joint.point
+            q[7 * free + number] = joint.position(change)
+            v[6 * free + number] = (
+                velocity[:3] @ joint.axis if joint.slides else velocity[3:] @ joint.axis
+            )
+
+    def _bodies(self) -> tuple[FloatArray, FloatArray]:
+        """Return places (b, 7) and velocities (b, 6) of the bodies; see ``BodyMotion``."""
+        q, v, free = self._data.qpos, self._data.qvel, self._free
+        place, velocity = q[: 7 * free].reshape(-1, 7), v[: 6 * free].reshape(-1, 6)
+        if not self._joints:
+            return place, velocity
+        places, velocities = [*place], [*velocity]
+        for number, joint in enumerate(self._joints):
+            T, axis = joint.motion(float(q[7 * free + number])), np.array(joint.axis)
+            T[:3, 3] += T[:3, :3] @ joint.point
+            rate = float(v[6 * free + number]) * axis
+            places.append(_place(T))
+            velocities.append(
+                np.append(rate, 0.0 * rate) if joint.slides else np.append(0.0 * rate, rate)
+            )
+        return np.array(places), np.array(velocities)
 
     def _place_links(
         self, x: FloatArray, towards: FloatArray, rates: Rates | None, dt: float, h: float
@@ -351,10 +388,10 @@ class BodySimulation:
         start, last = self._links(x, first_rate), self._links(towards, last_rate).twists
         place, first = start
         acceleration = (last - first) / dt
-        data, count, links = self._data, len(self._names), len(place)
-        q = data.qpos[7 * count : 7 * (count + links)].reshape(-1, 7)
+        data, links = self._data, len(place)
+        q = data.qpos[self._link_q :][: 7 * links].reshape(-1, 7)
         v, force = (
-            values[6 * count : 6 * (count + links)].reshape(-1, 6)
+            values[self._link_v :][: 6 * links].reshape(-1, 6)
             for values in (data.qvel, data.qfrc_applied)
         )
         # The engine moves by the speed at the end of a step.
@@ -495,7 +532,9 @@ class BodySimulation:
 
         ``before``: (b, 7) their places before the step, which they leave no faster.
         """
-        data, count = self._data, len(self._names)
+        data, count, deep = self._data, self._free, deep[: self._free]
+        speeds = data.qvel[6 * count : self._link_v]
+        speeds[:] = np.clip(speeds, -self._joint_limits, self._joint_limits)
         v = data.qvel[: 6 * count].reshape(-1, 2, 3)
         # No velocity is longer than twice its largest part.
         if 2.0 * np.abs(v).max(initial=0.0) < (PARTING_SPEED if deep.any() else MAX_SPEED):
@@ -528,26 +567,16 @@ def _is_slow(velocity: FloatArray, speed: float) -> BoolArray:
     return np.asarray((speeds[:, :3].max(1) < speed) & (speeds[:, 3:].max(1) < 10.0 * speed))
 
 
-def _radius(body: RigidBody) -> float:
-    """Return the radius [m] of the ball about the origin of a body that contains it."""
-    return max(
-        float(np.linalg.norm(T[:3, :3] @ shape.centre + T[:3, 3])) + shape.radius
-        for T, shape in zip(body.T_body_shape, body.shapes, strict=True)
-    )
-
-
-def _inside(body: RigidBody) -> tuple[FloatArray, float]:
-    """Return the middle (3,) and radius [m] of a ball in the first piece of a body."""
-    shape, T = body.shapes[0], body.T_body_shape[0]
-    return T[:3, :3] @ shape.centre + T[:3, 3], 0.5 * INSIDE * float((shape.high - shape.low).min())
-
-
 def poses_of(motion: BodyMotion) -> dict[str, FloatArray]:
     """Return the pose (4, 4) of each body in the base frame."""
     return {
-        name: frozen(se3.from_rotation_translation(so3.from_quaternion(place[3:]), place[:3]))
+        name: frozen(_pose_at(place))
         for name, place in zip(motion.names, motion.place, strict=True)
     }
+
+
+def _pose_at(place: FloatArray) -> FloatArray:
+    return se3.from_rotation_translation(so3.from_quaternion(place[3:]), place[:3])
 
 
 def _place(T: FloatArray) -> FloatArray:
