@@ -164,7 +164,7 @@ class HandlesLayer(ViewLayer):
         scene_object = self._objects[name]
         if event.phase == "start":
             self._dragged, self._start = (name, actor), scene_object
-        if scene_object.carried or self._dragged != (name, actor):
+        if not scene_object.can_be_moved or self._dragged != (name, actor):
             return
         if event.phase == "end":
             self._dragged = None

@@ -64,6 +64,16 @@ class ObjectRequests(RequestHandler):
         known = self._known(request.name)
         if known is None and len(arm.state.objects) >= MAX_OBJECTS:
             raise InputError(f"There are {MAX_OBJECTS} objects already: remove one first.")
+        fields = request.T, request.near, request.shape, request.size, request.scale, request.zone
+        if (
+            known is not None
+            and known.joint is not None
+            and any(item is not None for item in fields)
+        ):
+            raise InputError(
+                f"{request.name!r} is on a joint: it moves only by it. Change its place, size and "
+                "joint in the scene file."
+            )
         scene_object = self._shaped(request, known)
         others = [other for other in arm.state.objects if other.name != request.name]
         if is_vessel(scene_object) and sum(map(is_vessel, others)) >= MAX_VESSELS:
@@ -131,6 +141,7 @@ class ObjectRequests(RequestHandler):
             appearance=_appearance(request, PLAIN if known is None else known.appearance),
             fixed=known is not None and known.fixed,
             zone=zone,
+            joint=None if known is None else known.joint,
         )
 
     def _attached(self, request: requests.Attach) -> cmd.Command:

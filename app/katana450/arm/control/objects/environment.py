@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Z
 from katana450.caching import cached_property
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
-from katana450.maths.geometry import se3
+from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.environment import TableTop
 
@@ -55,6 +55,27 @@ def obstacle_of(scene_object: SceneObject) -> Part:
     return obstacle(scene_object.name, T, scene_object.collision_shape)
 
 
+def _held_part(objects: Sequence[SceneObject]) -> SceneObject | None:
+    """Return the held part of a body on a joint; None if there is none."""
+    return next((item for item in objects if item.held and item.joint is not None), None)
+
+
+def _led(objects: Sequence[SceneObject]) -> dict[str, SceneObject]:
+    """Return the other parts of the body that the hand holds by a part, in the frame of the hand.
+
+    They go where that part goes, as far as their joint allows.
+    """
+    held = _held_part(objects)
+    if held is None or held.joint is None:
+        return {}
+    T = held.T @ se3.inverse(held.joint.T_zero)
+    return {
+        item.name: replace(item, T=T @ item.joint.T_zero)
+        for item in objects
+        if item is not held and item.joint is not None and item.joint.body == held.joint.body
+    }
+
+
 class Environment:
     """Collision world of the arm with any objects, and the poses of these objects."""
 
@@ -71,6 +92,8 @@ class Environment:
         self._world = world
         self.hand = hand
         self.table = table
+        # Cache for the newest objects: those that the hand leads stand still in its frame.
+        self._cache: tuple[list[tuple[object, ...]], CollisionWorld] | None = None
 
     @property
     def bodies(self) -> CollisionWorld | None:
@@ -88,21 +111,34 @@ class Environment:
         """Return the collision world with ``objects``; None if contacts are not checked."""
         if self._world is None:
             return None
-        standing = [
-            obstacle_of(scene_object)
-            for scene_object in objects
-            if not (scene_object.carried or scene_object.zone is Zone.SLOW)
+        led = _led(objects)
+        placed = [led.get(item.name, item) for item in objects if item.zone is not Zone.SLOW]
+        key: list[tuple[object, ...]] = [
+            (item.name, item.collision_shape.mark, item.T.tobytes(), item.carried, item.can_be_held)
+            for item in placed
         ]
-        world = self._world.with_obstacles(standing) if standing else self._world
-        for scene_object in objects:
-            if scene_object.carried and self.hand is not None:
-                part = Part(
-                    scene_object.name,
-                    self.hand.palm,
-                    (frozen(scene_object.T_collision_shape),),
-                    (scene_object.collision_shape,),
-                )
-                world = world.with_carried(part)
+        newest = self._cache
+        if newest is None or newest[0] != key:
+            self._cache = newest = key, self._world_of(self._world, placed, led)
+        return newest[1]
+
+    def _world_of(
+        self, world: CollisionWorld, objects: Sequence[SceneObject], led: Mapping[str, SceneObject]
+    ) -> CollisionWorld:
+        """Return ``world`` with ``objects``, of which those in ``led`` go with the hand."""
+        standing, carried, on_joint = list[Part](), list[Part](), list[Part]()
+        for item in objects:
+            if not item.carried and item.name not in led:
+                standing.append(obstacle_of(item))
+            elif self.hand is not None:
+                T, shape = frozen(item.T_collision_shape), item.collision_shape
+                part = Part(item.name, self.hand.palm, (T,), (shape,))
+                (carried if item.joint is None else on_joint).append(part)
+        if standing:
+            world = world.with_obstacles(standing)
+        for parts in (carried, on_joint):
+            if parts:
+                world = world.with_carried(*parts, on_joint=parts is on_joint)
         return world
 
     def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
@@ -129,6 +165,34 @@ class Environment:
         x: (k,) joints and finger joint [rad].
         """
         return scene_object.T if not scene_object.carried else self._palm(x) @ scene_object.T
+
+    def led(
+        self, objects: tuple[SceneObject, ...], x: FloatArray
+    ) -> tuple[tuple[SceneObject, ...], float, float]:
+        """Return ``objects`` where the hand has led the body on a joint of which it holds a part.
+
+        Returns:
+            The objects, and how far [m, rad] the joint keeps that part from its place in the hand.
+
+        x: (k,) joints and finger joint [rad].
+        """
+        held = _held_part(objects)
+        if held is None or held.joint is None:
+            return objects, 0.0, 0.0
+        T = self.pose(held, x)
+        position, body = held.joint.position(T), held.joint.body
+        allowed = held.joint.pose(position)
+        moved = tuple(
+            replace(
+                item,
+                T=item.joint.pose(position) if item is not held else self.into_hand(allowed, x),
+            )
+            if item.joint is not None and item.joint.body == body
+            else item
+            for item in objects
+        )
+        distance = float(np.linalg.norm(T[:3, 3] - allowed[:3, 3]))
+        return moved, distance, so3.angle(T[:3, :3], allowed[:3, :3])
 
     def taken(self, scene_object: SceneObject, x: FloatArray) -> SceneObject:
         """Return ``scene_object`` as held by the hand, at the place where it is."""

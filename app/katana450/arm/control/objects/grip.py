@@ -85,7 +85,11 @@ def _holding(environment: Environment, hand: Hand, before: State, state: State, 
     load = math.fsum(contact.friction for contact in contacts_of(before))
     reason = None
     if max(side_forces(hand, state.bodies.contacts, held.name)) == 0.0:
-        if before.grip is None or not contacts_of(before):
+        touched = bool(contacts_of(before))
+        # The contacts of a part that its joint keeps from the middle of the fingers can fail for
+        # a tick.
+        is_first = touched if held.joint is not None else not touched
+        if before.grip is None or before.bodies is None or is_first:
             # The fingers have only begun to press on it.
             return state
         state, reason = _let_go(environment, state), Reason.SLIPPED

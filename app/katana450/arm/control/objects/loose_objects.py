@@ -43,7 +43,7 @@ def is_loose(scene_object: SceneObject) -> bool:
 
     All other objects are parts of the work cell and may hang in the air.
     """
-    return not scene_object.carried and (
+    return not (scene_object.carried or scene_object.joint) and (
         scene_object.can_be_held or is_vessel(scene_object) or scene_object.name == BASIN
     )
 
@@ -260,7 +260,10 @@ class LooseObjects:
             return state
         simulation = self._simulation(state, movable)
         start, end = before.x_setpoint, state.x_setpoint
-        poses = {item.name: self._environment.pose(item, start) for item in movable}
+        poses = {}
+        for item in movable:
+            T = self._environment.pose(item, start)
+            poses[_body_name(item)] = T if item.joint is None else item.joint.body_pose(T)
         motion = simulation.begin(poses, motion, moved, woken)
         if dt <= 0.0:
             return replace(state, bodies=motion)
@@ -310,7 +313,7 @@ class LooseObjects:
                 old, new = known.get(name), now.get(name)
                 if old is new or (old and new and _body_of(old) == _body_of(new)):
                     continue
-                moved.add(name)
+                moved.update(_body_name(item) for item in (old, new) if item)
                 places += [self._ball(old, before)] if old else []
                 places += [self._ball(new, state)] if new else []
         if (before.x_setpoint != state.x_setpoint).any():
@@ -331,7 +334,9 @@ class LooseObjects:
         """Return the objects at their places in ``motion``; the same tuple if none has moved."""
         poses, shown = poses_of(motion), []
         for scene_object in state.objects:
-            T = poses.get(scene_object.name)
+            T, joint = poses.get(_body_name(scene_object)), scene_object.joint
+            if T is not None and joint is not None:
+                T = frozen(T @ joint.T_body_part)
             if T is not None and scene_object.held:
                 T = self._environment.into_hand(T, state.x_setpoint)
             if T is not None and _apart(scene_object.T, T):
@@ -344,9 +349,13 @@ class LooseObjects:
     def _simulation(self, state: State, loose: Sequence[SceneObject]) -> BodySimulation:
         """Return the simulation of ``loose`` objects among everything else in ``state``."""
         others = [item for item in state.objects if not (can_move(item) or item.is_zone)]
+        # Those on joints come last.
+        loose = sorted(loose, key=lambda item: item.joint is not None)
         masses = [self.mass(scene_object, state) for scene_object in loose]
+        joints = [None if item.joint is None else item.joint.key for item in loose]
         key = (
             *((item.name, item.shape, item.extent, item.solid) for item in loose),
+            *joints,
             *masses,
             *(
                 (item.name, item.shape, item.extent, item.T.tobytes(), item.fixed)
@@ -356,10 +365,10 @@ class LooseObjects:
         if self._cache is None or self._cache[0] != key:
             world = self._environment.bodies
             assert world is not None
-            bodies = [
-                self._body(scene_object, mass)
-                for scene_object, mass in zip(loose, masses, strict=True)
-            ]
+            parts_of: dict[str, list[SceneObject]] = {}
+            for item in loose:
+                parts_of.setdefault(_body_name(item), []).append(item)
+            bodies = [self._body(name, parts, state) for name, parts in parts_of.items()]
             parts = [part for part in world.parts if part.name != "table"]
             parts += [self._part(scene_object) for scene_object in others]
             drive = None if self._hand is None else self._hand.drive
@@ -390,9 +399,20 @@ class LooseObjects:
             return None
         return water.cup if scene_object.name == CUP else water.cup.sized(*scene_object.extent)
 
-    def _body(self, scene_object: SceneObject, mass: float) -> RigidBody:
-        shapes, places = self._pieces(scene_object)
-        return RigidBody(scene_object.name, shapes, places, mass, FRICTION)
+    def _body(self, name: str, parts: Sequence[SceneObject], state: State) -> RigidBody:
+        """Return the body ``name`` of one object, or of all ``parts`` on one joint."""
+        shapes, places, owners = list[CollisionShape](), list[FloatArray](), list[str]()
+        for part in parts:
+            own_shapes, own_places = self._pieces(part)
+            T = np.eye(4) if part.joint is None else part.joint.T_body_part
+            shapes += own_shapes
+            places += [frozen(T @ place) for place in own_places]
+            owners += [part.name] * len(own_shapes)
+        joint = None if parts[0].joint is None else parts[0].joint.joint
+        mass = None if joint is None else joint.mass
+        if mass is None:
+            mass = math.fsum(self.mass(part, state) for part in parts)
+        return RigidBody(name, tuple(shapes), tuple(places), mass, FRICTION, joint, tuple(owners))
 
     def _part(self, scene_object: SceneObject) -> Part:
         """Return an object that does not move by itself as a part of the world or of the hand."""
@@ -445,14 +465,20 @@ def _radius(scene_object: SceneObject) -> float:
 
 
 def can_move(scene_object: SceneObject) -> bool:
-    """Return whether an object moves by itself: it is loose, or held by friction."""
-    return scene_object.held or is_loose(scene_object)
+    """Return whether an object moves by itself: it is loose, on a joint, or held by friction."""
+    return scene_object.held or scene_object.joint is not None or is_loose(scene_object)
+
+
+def _body_name(scene_object: SceneObject) -> str:
+    """Return the name of the body of which an object is a part, or the only one."""
+    joint = scene_object.joint
+    return scene_object.name if joint is None else f"parts of {joint.body}"
 
 
 def _near(
     objects: Sequence[SceneObject], places: Sequence[Ball], environment: Environment, state: State
 ) -> set[str]:
-    """Return the names of the ``objects`` of ``state`` beside ``places``."""
+    """Return the names of the bodies of the ``objects`` of ``state`` beside ``places``."""
     near = set[str]()
     for scene_object in objects if places else ():
         T = environment.pose(scene_object, state.x_setpoint)
@@ -460,7 +486,7 @@ def _near(
         for place in places:
             reach = place.radius + _radius(scene_object) + WAKING_DISTANCE
             if float(np.linalg.norm(middle - place.middle)) < reach:
-                near.add(scene_object.name)
+                near.add(_body_name(scene_object))
     return near
 
 

@@ -63,10 +63,10 @@ def removed(state: State, name: str) -> State:
 
 
 def with_moved_object(state: State, command: MoveObject) -> State:
-    """Return ``state`` with the object moved, unless the hand carries it."""
+    """Return ``state`` with the object moved, unless the hand carries it or it is on a joint."""
 
     def moved(scene_object: SceneObject) -> SceneObject:
-        if scene_object.name != command.name or scene_object.carried:
+        if scene_object.name != command.name or not scene_object.can_be_moved:
             return scene_object
         T = np.array(scene_object.T)
         if command.position is not None:

@@ -238,7 +238,8 @@ def refusal(state: State, command: cmd.Command) -> str:
         case cmd.Remove(name=name) | cmd.MoveObject(name=name) | cmd.Attach(name=name):
             if named(state.objects, name) is None:
                 return f"There is no {name!r}."
-            return _held(state, name)
+            on_joint = not isinstance(command, cmd.Remove) and _on_joint(state, name)
+            return on_joint or _held(state, name)
     return ""
 
 
@@ -263,6 +264,13 @@ def outcome(before: State, after: State) -> Outcome:
     if any(finding.reason is Reason.NOT_AT_START for finding in findings):
         return Outcome(Verdict.REFUSED, findings)
     return Outcome(Verdict.LIMITED, findings) if findings else ACCEPTED
+
+
+def _on_joint(state: State, name: str) -> str:
+    scene_object = named(state.objects, name)
+    if scene_object is None or scene_object.joint is None:
+        return ""
+    return f"{name!r} is on a joint: it moves only by it. Change its place in the scene file."
 
 
 def _held(state: State, name: str) -> str:

@@ -157,14 +157,19 @@ class Session:
         return self._for(state)[1]
 
     def _for(self, state: State) -> _Cache:
-        if self._cache is None or self._cache[0] is not state.objects:
+        newest = self._cache
+        if newest is None or newest[0] is not state.objects:
             world = self.environment.world(state.objects)
-            touch = None
-            if world is not None and self.arm is not None:
-                touch = self.environment.touch(world, state.objects)
-            stepper = MotionStepper(self._robot, world, self._tool_speed, touch, self._travel)
-            self._cache = (state.objects, world, stepper)
-        return self._cache
+            if newest is not None and world is newest[1]:
+                newest = (state.objects, *newest[1:])
+            else:
+                touch = None
+                if world is not None and self.arm is not None:
+                    touch = self.environment.touch(world, state.objects)
+                stepper = MotionStepper(self._robot, world, self._tool_speed, touch, self._travel)
+                newest = (state.objects, world, stepper)
+            self._cache = newest
+        return newest
 
     def _stepper(self, state: State) -> MotionStepper:
         return self._for(state)[2]

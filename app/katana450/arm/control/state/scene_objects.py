@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from katana450.arm.control.state.object_joint import ObjectJoint
 from katana450.arm.control.state.solid import PLAIN, ObjectAppearance, Solid
 from katana450.errors import InputError, digits_beyond
 from katana450.maths.collision.shape import CollisionShape, box, cylinder, hull, sphere
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
-
-if TYPE_CHECKING:
-    pass
-
 
 MAX_OBJECTS = 64
 """Maximum number of objects at a time."""
@@ -104,6 +100,7 @@ class SceneObject:
         appearance: how it is drawn.
         fixed: whether it is fixed to the hand.
         zone: its rule for the arm, if it is no body.
+        joint: the joint on which it moves; None for other objects.
     """
 
     name: str
@@ -117,6 +114,7 @@ class SceneObject:
     appearance: ObjectAppearance = PLAIN
     fixed: bool = False
     zone: Zone = Zone.NONE
+    joint: ObjectJoint | None = None
 
     def __post_init__(self) -> None:
         if not (self.name.isprintable() and 0 < len(self.name) <= MAX_NAME_LENGTH):
@@ -159,6 +157,12 @@ class SceneObject:
             )
         if self.shape is Shape.PLANE and not self.is_zone:
             raise InputError(f"{self.name!r} is a plane, so it must be a zone.")
+        is_part = self.shape is not Shape.VESSEL and not (self.fixed or self.is_zone)
+        if self.joint is not None and not is_part:
+            raise InputError(
+                f"{self.name!r} is on a joint, so it is no zone, no vessel and not fixed to the "
+                "hand."
+            )
         T = frozen(se3.validated(self.T, f"The pose of {self.name!r}"))
         if np.abs(T[:3, 3]).max() > MAX_COORDINATE:
             raise InputError(f"{self.name!r} would be more than {MAX_COORDINATE:g} m away.")
@@ -173,6 +177,11 @@ class SceneObject:
     def carried(self) -> bool:
         """True if the object moves with the hand."""
         return self.held or self.fixed
+
+    @property
+    def can_be_moved(self) -> bool:
+        """True if people can put it elsewhere: the hand does not carry it, and it has no joint."""
+        return not self.carried and self.joint is None
 
     @property
     def extent(self) -> tuple[float, ...]:
@@ -234,17 +243,21 @@ def _properties(scene_object: SceneObject) -> tuple[object, ...]:
     key = None if scene_object.solid is None else scene_object.solid.key
     kind = (scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, key)
     flags = scene_object.can_be_held, scene_object.held, scene_object.fixed, scene_object.zone
-    return (*kind, *flags, scene_object.appearance)
+    joint = None if scene_object.joint is None else scene_object.joint.key
+    return (*kind, *flags, scene_object.appearance, joint)
 
 
 def placed(objects: tuple[SceneObject, ...], scene_object: SceneObject) -> tuple[SceneObject, ...]:
     """Return ``objects`` with ``scene_object`` in place of the one of its name.
 
-    An object with a new name is added if there is room. A held object stays.
+    An object with a new name is added if there is room. A held object stays, and one on a joint
+    stays where it is.
     """
-    known = [other.name for other in objects]
-    if scene_object.name not in known:
+    known = named(objects, scene_object.name)
+    if known is None:
         return (*objects, scene_object) if len(objects) < MAX_OBJECTS else objects
+    if known.joint is not None and not scene_object.held:
+        scene_object = replace(scene_object, T=known.T, joint=known.joint)
     return tuple(
         scene_object if other.name == scene_object.name and not other.held else other
         for other in objects
