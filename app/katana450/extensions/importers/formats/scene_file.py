@@ -6,6 +6,7 @@ All of it is read and checked before it is used. Paths cannot lead outside of th
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ import yaml
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.object_joint import ObjectJoint
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.robot.object_meshes import InitialScene, Mesh
 from katana450.atomic import bytes_of
@@ -59,8 +61,15 @@ def written(scene: Scene, files: Mapping[str, MeshFile], T_palm_tool: FloatArray
         entry["joints"] = [_round(angle, ANGLE_DIGITS) for angle in np.degrees(scene.joints)]
     if scene.water is not None:
         entry["water"] = _round(scene.water / ML, LENGTH_DIGITS)
+    leads: dict[str, str] = {}
+    for item in scene.objects:
+        if item.joint is not None and (
+            item.name == item.joint.body or item.joint.body not in leads
+        ):
+            leads[item.joint.body] = item.name
     entry["objects"] = [
-        _object_entry(scene_object, files, T_palm_tool) for scene_object in scene.objects
+        _object_entry(item, files, T_palm_tool, leads[item.joint.body] if item.joint else "")
+        for item in scene.objects
     ]
     # Lists of numbers are on one line.
     body: str = yaml.safe_dump(
@@ -70,10 +79,15 @@ def written(scene: Scene, files: Mapping[str, MeshFile], T_palm_tool: FloatArray
 
 
 def _object_entry(
-    scene_object: SceneObject, files: Mapping[str, MeshFile], T_palm_tool: FloatArray | None
+    scene_object: SceneObject,
+    files: Mapping[str, MeshFile],
+    T_palm_tool: FloatArray | None,
+    lead: str,
 ) -> dict[str, object]:
+    """Return the entry of an object; ``lead``: the first part of the body on its joint."""
     entry: dict[str, object] = {"name": scene_object.name, "shape": scene_object.shape.value}
-    T = scene_object.T
+    joint = scene_object.joint
+    T = scene_object.T if joint is None else joint.T_zero
     if scene_object.fixed and T_palm_tool is not None:
         T = se3.inverse(T_palm_tool) @ T
     if scene_object.solid is None:
@@ -105,7 +119,35 @@ def _object_entry(
         entry["zone"] = scene_object.zone.value
     if scene_object.fixed:
         entry["attach"] = "hand"
+    if joint is not None and lead != scene_object.name:
+        entry["part_of"] = lead
+    elif joint is not None:
+        entry["joint"] = _joint_entry(joint, joint.position(scene_object.T))
     return entry
+
+
+def _joint_entry(joint: ObjectJoint, position: float) -> dict[str, object]:
+    """Return the joint of a lead, which is at ``position`` [m or rad]."""
+    T, body_joint = se3.inverse(joint.T_zero), joint.joint
+    slides, loads = body_joint.slides, (body_joint.friction, body_joint.damping)
+
+    def shown(number: float) -> float:
+        value, digits = (
+            (1e3 * number, LENGTH_DIGITS) if slides else (math.degrees(number), ANGLE_DIGITS)
+        )
+        return _round(value, digits)
+
+    entry: dict[str, object] = {
+        "type": "slide" if slides else "hinge",
+        "axis": [_round(number, ANGLE_DIGITS) for number in T[:3, :3] @ body_joint.axis],
+        "range": [shown(body_joint.lower), shown(body_joint.upper)],
+        "position": shown(position),
+        **{name: load for name, load in zip(("friction", "damping"), loads, strict=True) if load},
+    }
+    if not slides:
+        point = T[:3, :3] @ body_joint.point + T[:3, 3]
+        entry["origin"] = [_round(1e3 * number, LENGTH_DIGITS) for number in point]
+    return entry if body_joint.mass is None else {**entry, "mass": body_joint.mass}
 
 
 def _round(value: float, digits: int) -> int | float:

@@ -41,6 +41,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.checkpoint import checkpoint
+from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path, joint_derivatives
 from katana450.maths.planning.plan import JOIN_TOLERANCE, check_clear
 
@@ -52,6 +53,12 @@ EXACT = 1e-9
 
 ALONG = np.linspace(0.0, 1.0, 5)
 """Places of a path (sigma) at which the joints are checked for motion."""
+
+LED = np.linspace(0.0, 1.0, 33)
+"""Places of a path (sigma) at which a hand that leads a body on a joint is checked."""
+
+MAX_LEAD, MAX_LEAD_TURN = 5e-3, math.radians(10.0)
+"""[m, rad] Maximum distance of a held part from its joint: the pads give way by as much."""
 
 CARRY = 1.0
 """[m/s^2] Maximum acceleration of the tool while it carries an object."""
@@ -249,11 +256,27 @@ class PlanState:
                     f"This {name} moves nothing: it ends where it begins. Change its "
                     "target or remove it."
                 )
+            self._check_joint(path, name)
             if world is not None:
                 check_clear(path, world, fingers)
         arm = self.plan_context.arm
         untimed = UntimedPath(arm, world, self.state, tuple(paths), tool_speed=tool_speed)
         return self.with_action(name, untimed, self.standing(paths[-1].end).state)
+
+    def _check_joint(self, path: Path, name: str) -> None:
+        """Raise InputError if ``path`` leads a held part of a drawer or door off its joint."""
+        held, environment = self.state.held, self.plan_context.session.environment
+        if held is None or held.joint is None:
+            return
+        for q in np.column_stack([angle.c0 for angle in path.joints(Jet.variable(LED))]):
+            x = np.append(q, self.state.gripper_setpoint)
+            _, distance, turn = environment.led(self.state.objects, x)
+            if distance > MAX_LEAD or turn > MAX_LEAD_TURN:
+                raise InputError(
+                    f"{held.name} is on a joint, and this {name} leads the hand "
+                    f"{1e3 * distance:.0f} mm and {math.degrees(turn):.0f} deg off it. Move the "
+                    "tool along the joint and in its range, or release it first."
+                )
 
     def first(self, options: Iterable[W], build: Callable[[PlanState, W], PlanState]) -> PlanState:
         """Return the plan that ``build`` makes from this one with the first possible option.
@@ -310,7 +333,9 @@ class PlanState:
             self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE,
             stopped=None, paused=False, blocked=False, bodies=None,
         )  # fmt: skip
-        return replace(self, state=standing).with_still_water()
+        environment = self.plan_context.session.environment
+        objects, _, _ = environment.led(standing.objects, standing.x_setpoint)
+        return replace(self, state=replace(standing, objects=objects)).with_still_water()
 
     def with_missed_grasp(self) -> PlanState:
         """Return the plan as if the last grasp had missed.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.pouring import CUP
 from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.object_joint import ObjectJoint
 from katana450.arm.control.state.scene_objects import (
     MAX_COORDINATE,
     MAX_OBJECTS,
@@ -44,6 +45,7 @@ from katana450.extensions.programs.language.scope import ScriptContext
 from katana450.extensions.programs.language.source import Problem, ScriptError, YamlValue, read
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.physics.joint import MAX_BODY_MASS, MAX_LOAD, BodyJoint
 from katana450.maths.water.units import MILLILITRE, ML
 
 VERSION = 1
@@ -135,6 +137,56 @@ class MeshFile(Declared):
     ] = None
 
 
+AMOUNT = number(0.0, MAX_LOAD)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JointEntry(Declared):
+    """A joint between an object and the ground.
+
+    Attributes:
+        axis: (3,) direction, and ``origin``: (3,) a point [m] of it, in the frame of the object.
+        ends: the range, and ``start``: the position at the start [mm or deg].
+
+    All others are as in ``BodyJoint``.
+    """
+
+    noun = "a joint"
+
+    kind: Annotated[str, choice("slide", "hinge").about("How it moves").named("type")]
+    axis: kinds.Direction
+    origin: Annotated[FloatArray, kinds.vector(POSE_LENGTH, "A point of the axis, mm")] = field(
+        default_factory=lambda: np.zeros(3)
+    )
+    ends: Annotated[
+        tuple[float, ...],
+        listed(number(-4e3, 4e3), 2, 2).about("Lower and upper end, mm or deg").named("range"),
+    ]
+    start: Annotated[
+        float, number(-4e3, 4e3, about="Position at the start, mm or deg").named("position")
+    ] = 0.0
+    friction: Annotated[float, AMOUNT.about("Force that moves it, N; of a hinge N m")] = 0.0
+    damping: Annotated[float, AMOUNT.about("N s/m; of a hinge N m s/rad")] = 0.0
+    mass: Annotated[
+        float | None, number(1e-3, MAX_BODY_MASS, about="Of all parts, kg; by volume unless given")
+    ] = None
+
+    def joint(self, T: FloatArray) -> BodyJoint:
+        """Return the joint of an object whose pose is ``T`` (4, 4) at zero [m]."""
+        point, axis = T[:3, :3] @ self.origin + T[:3, 3], T[:3, :3] @ self.axis
+        lower, upper = (self.si(end) for end in self.ends)
+        place = tuple(point.tolist()), tuple((axis / np.linalg.norm(axis)).tolist())
+        slides, loads = self.kind == "slide", (self.friction, self.damping)
+        joint = BodyJoint(slides, *place, lower, upper, *loads, mass=self.mass)
+        if not lower <= self.si(self.start) <= upper:
+            raise InputError(f"The position {self.start:g} of the joint is not in its range.")
+        return joint
+
+    def si(self, position: float) -> float:
+        """Return a position in m or rad that is given in mm or deg."""
+        return 1e-3 * position if self.kind == "slide" else math.radians(position)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SceneEntry(Declared):
     """An object.
@@ -142,7 +194,9 @@ class SceneEntry(Declared):
     Attributes:
         source: its place in the text, for error messages.
         mesh: its mesh file; None for other shapes.
-        T: (4, 4) its pose [m] in the base frame, or in the tool frame if it is ``fixed``.
+        T: (4, 4) its pose [m] in the base frame, or in the tool frame if it is ``fixed``; that with
+            its joint at zero.
+        part_of: name of the object on whose joint it moves; None for that of its own.
 
     All others are as in ``SceneObject``.
     """
@@ -176,6 +230,8 @@ class SceneEntry(Declared):
         str, choice(*(zone.value for zone in Zone)).about("Rule for the arm in it").named("zone")
     ] = Zone.NONE.value
     attach: Annotated[str, choice("hand", "world").about("hand: it moves with the hand")] = "world"
+    joint: Annotated[JointEntry | None, record(JointEntry)] = None
+    part_of: Annotated[str | None, TEXT.about("Object with a joint, with which it moves")] = None
 
     @classmethod
     def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -261,27 +317,29 @@ class SceneDraft(Declared):
         """
         objects: list[SceneObject] = []
         problems: list[Problem] = []
+        leads = {entry.name: entry for entry in self.entries if entry.joint is not None}
         for entry in self.entries:
             try:
+                joint, start = _joint(entry, leads)
                 if entry.fixed and T_palm_tool is None:
                     raise InputError(
                         "Nothing can be attached to the hand: this arm has no model of a hand. "
                         "Remove `attach: hand`."
                     )
+                T = entry.T if T_palm_tool is None or not entry.fixed else T_palm_tool @ entry.T
                 objects.append(
                     SceneObject(
                         entry.name,
                         entry.shape,
                         entry.size,
-                        T_palm_tool @ entry.T
-                        if entry.fixed and T_palm_tool is not None
-                        else entry.T,
+                        T if joint is None else joint.pose(start),
                         entry.can_be_held,
                         solid=None if entry.mesh is None else solids[entry.mesh],
                         scale=entry.scale,
                         appearance=entry.appearance,
                         fixed=entry.fixed,
                         zone=Zone(entry.zone_name),
+                        joint=joint,
                     )
                 )
             except InputError as error:
@@ -340,6 +398,23 @@ class SceneDraft(Declared):
         if abs(wanted - cup) > SAME_VOLUME:
             return f"the cup has {cup:.1f} ml of water, not {wanted:.1f} ml of water"
         return ""
+
+
+def _joint(entry: SceneEntry, leads: Mapping[str, SceneEntry]) -> tuple[ObjectJoint | None, float]:
+    """Return the joint of an object and its position at the start [m or rad].
+
+    ``leads``: the objects with a joint of their own. Raises InputError for a part of another one.
+    """
+    if entry.joint is None and entry.part_of is None:
+        return None, 0.0
+    name = entry.name if entry.part_of is None else entry.part_of
+    lead = leads.get(name)
+    if lead is None or lead.joint is None or None not in (entry.joint, entry.part_of):
+        raise InputError(
+            f"`part_of` must be another object with a `joint`, and {entry.name} must then have no "
+            "`joint` of its own."
+        )
+    return ObjectJoint(name, lead.joint.joint(lead.T), entry.T), lead.joint.si(lead.joint.start)
 
 
 def parsed(source: str) -> SceneDraft:
@@ -423,6 +498,13 @@ def _object_difference(
     if (entry.can_be_held, entry.zone_name) != (present.can_be_held, present.zone.value):
         return f"{entry.name} has another `can_be_held` or `zone`"
     T = entry.T if T_palm_tool is None or not entry.fixed else T_palm_tool @ entry.T
+    if (present.joint is None) is not (entry.joint is None and entry.part_of is None):
+        return f"{entry.name} has another joint"
+    if present.joint is not None and entry.joint is not None:
+        T = present.joint.joint.motion(entry.joint.si(entry.joint.start)) @ T
+    elif present.joint is not None:
+        # It is where the object is of which it is a part.
+        T = present.joint.pose(present.joint.position(present.T))
     if float(np.linalg.norm(T[:3, 3] - present.T[:3, 3])) > SAME_PLACE:
         x, y, z = (1e3 * present.T[:3, 3]).tolist()
         return f"{entry.name} is elsewhere, at ({x:.1f}, {y:.1f}, {z:.1f}) mm"

@@ -148,6 +148,8 @@ def held_object(plan: PlanState, step: str) -> SceneObject:
 
 def check_fall(plan: PlanState, held: SceneObject) -> None:
     """Raise InputError if the held object would fall, or nothing carries it, if it is released."""
+    if held.joint is not None:
+        return
     T = plan.plan_context.session.environment.pose(held, plan.state.x_setpoint)
     lifted = replace(held, T=T, held=False)
     below = surface_below(_objects_around(plan), lifted)
