@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,12 @@ from katana450.arm.control.state.messages import sentence
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import Reason, State
 from katana450.arm.robot.arm_reader import MountedArm
-from katana450.extensions.programs.run.simulation import run_by_clock
+from katana450.errors import InputError
+from katana450.extensions.programs.building.plan_state import PlanContext
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.run.runner import Phase
+from katana450.extensions.programs.run.simulation import follow_exactly, run_by_clock, simulated
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.maths.water.units import GRAVITY
@@ -29,7 +35,7 @@ from tests.general_arms.test_grasping import item, planned
 from tests.general_arms.test_published_hands import KINDS
 from tests.recording.recorded import fresh
 from tests.recording.sessions import record_session
-from tests.ticks import during, rested, settled, ticked
+from tests.ticks import TICK, during, rested, settled, ticked
 
 WEIGHT = 0.0614 * GRAVITY
 """[N] Weight of the empty cup."""
@@ -193,3 +199,39 @@ def test_grip_and_slip_are_identical_to_the_bit_in_a_recording(tmp_path: Path) -
         result = verify_recording(file, fresh().session)
     assert result.identical, result
     assert result.ticks > 150
+
+
+def test_fingers_crush_what_bears_less_than_their_force(
+    session: Session, arm: MountedArm, around: State
+) -> None:
+    (cup,) = (item for item in around.objects if item.name == "cup")
+
+    def closed_on(crush_force: float) -> State:
+        firm = replace(around, objects=(replace(cup, crush_force=crush_force),))
+        return rested(session, firm, cmd.Gripper(-0.44))
+
+    crushed, whole = closed_on(3.0), closed_on(2.0 * FINGER_FORCE)
+    assert whole.held is not None
+    assert Reason.CRUSHED not in {finding.reason for finding in whole.findings}
+    (finding,) = (f for f in crushed.findings if f.reason is Reason.CRUSHED)
+    assert 3.0 < finding.amount <= FINGER_FORCE
+    assert finding.limit == 3.0
+    assert "cup was crushed: " in sentence(crushed).lower()
+    assert "and it bears 3.0 n" in sentence(crushed).lower()
+    # The next command of the fingers ends it.
+    opened = rested(session, crushed, cmd.Gripper(OPEN))
+    assert Reason.CRUSHED not in {finding.reason for finding in opened.findings}
+    # A program that closes them stops with the reason.
+    firm = replace(around, objects=(replace(cup, crush_force=3.0),))
+    program = compiled(
+        parse("steps: [{gripper: -25}]"), PlanContext(session, arm.T_base_shoulder), firm
+    )
+    (*_, (_, run)) = simulated(program, session, firm, TICK, follow_exactly)
+    assert run.phase is Phase.FAILED
+    assert "was crushed" in run.why
+
+
+@pytest.mark.parametrize("force", [0.0, -1.0, float("nan"), 1e9])
+def test_impossible_crush_force_is_refused(around: State, force: float) -> None:
+    with pytest.raises(InputError, match="force that 'cup' bears"):
+        replace(around.objects[0], crush_force=force)

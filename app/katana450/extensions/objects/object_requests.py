@@ -142,6 +142,7 @@ class ObjectRequests(RequestHandler):
             fixed=known is not None and known.fixed,
             zone=zone,
             joint=None if known is None else known.joint,
+            crush_force=None if known is None else known.crush_force,
         )
 
     def _attached(self, request: requests.Attach) -> cmd.Command:

@@ -44,6 +44,7 @@ UNITS = {
     control.Reason.LOPSIDED: "m",
     control.Reason.SLIDING: "N",
     control.Reason.SLIPPED: "N",
+    control.Reason.CRUSHED: "N",
     control.Reason.NOT_AT_START: "rad",
     control.Reason.SLOW_ZONE: "m/s",
 }

@@ -37,6 +37,29 @@ def gripped(environment: Environment, before: State, state: State, dt: float) ->
     hand = environment.hand
     if hand is None or not (hand.can_hold and state.objects) or dt <= 0.0:
         return state
+    return _crushed(hand, before, _gripped(environment, hand, before, state, dt))
+
+
+def _crushed(hand: Hand, before: State, state: State) -> State:
+    """Return ``state`` with a finding on each object that the fingers have just crushed.
+
+    The lesser force of two ticks counts, because that of an impact lasts for one.
+    """
+    known = {finding.parts for finding in state.findings if finding.reason is Reason.CRUSHED}
+    for item in state.objects if contacts_of(before) and contacts_of(state) else ():
+        limit, parts = item.crush_force, (item.name, hand.fingers[0])
+        if limit is None or parts in known:
+            continue
+        both = (contacts_of(before), contacts_of(state))
+        force = min(max(side_forces(hand, contacts, item.name)) for contacts in both)
+        if force > limit:
+            crushed = Finding(Reason.CRUSHED, force, parts=parts, limit=limit)
+            state = replace(state, findings=(crushed, *state.findings))
+    return state
+
+
+def _gripped(environment: Environment, hand: Hand, before: State, state: State, dt: float) -> State:
+    """Return ``state`` after ``hand`` has closed on an object, held it, let it go or lost it."""
     gripper = hand.gripper
     if state.grip is not None:
         return _holding(environment, hand, before, state, dt)

@@ -407,7 +407,7 @@ class Session:
         # The fingers cannot close on what they hold: what is wanted beyond it squeezes the object.
         goal = wanted if state.grip is None or limits.is_wider(wanted, state.grip) else state.grip
         reason = Reason.GRIPPER_SLIDE_LIMIT if limits.slides else Reason.GRIPPER_LIMIT
-        others = without_finding(state, reason, Reason.SLIPPED).findings
+        others = without_finding(state, reason, Reason.SLIPPED, Reason.CRUSHED).findings
         beyond = abs(wanted - angle) > tolerances.LIMIT_SLACK
         held = (Finding(reason, wanted),) if beyond else ()
         return replace(state, gripper_goal=goal, squeeze=abs(goal - wanted), findings=others + held)

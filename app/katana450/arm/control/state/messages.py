@@ -145,6 +145,10 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
         f"{part((f.parts or ('the object',))[0])} slipped out of the fingers under a load of "
         f"{short(f.amount)} N: open the gripper, then grip it with more force"
     ),
+    Reason.CRUSHED: lambda f: (
+        f"{part((f.parts or ('the object',))[0])} was crushed: {short(f.amount)} N, and it bears "
+        f"{short(f.limit)} N; grip it with less force"
+    ),
     Reason.SLOW_ZONE: lambda f: (
         "{} is in or near the zone {}: the tool moves with at most ".format(
             *map(part, f.parts or ("a part", "of reduced speed"))
@@ -228,6 +232,7 @@ ABOUT_NOW = (
     Reason.CONTACT,
     Reason.LOPSIDED,
     Reason.SLIPPED,
+    Reason.CRUSHED,
     Reason.SLOW_ZONE,
     Reason.INTERNAL,
 )

@@ -28,6 +28,9 @@ MAX_SIZE, MIN_SIZE = 2.0, 1e-3
 ROUNDING = 1e-6
 """[1] Tolerance of a bound, for the size of a mesh in single precision."""
 
+MAX_CRUSH_FORCE = 1e4
+"""[N] Maximum force that an object can be said to bear."""
+
 MIN_SCALE, MAX_SCALE = 1e-3, 1e3
 
 PLANE_DEPTH = 10.0
@@ -101,6 +104,7 @@ class SceneObject:
         fixed: whether it is fixed to the hand.
         zone: its rule for the arm, if it is no body.
         joint: the joint on which it moves; None for other objects.
+        crush_force: largest force of the fingers of one side that it bears [N]; None for any.
     """
 
     name: str
@@ -115,6 +119,7 @@ class SceneObject:
     fixed: bool = False
     zone: Zone = Zone.NONE
     joint: ObjectJoint | None = None
+    crush_force: float | None = None
 
     def __post_init__(self) -> None:
         if not (self.name.isprintable() and 0 < len(self.name) <= MAX_NAME_LENGTH):
@@ -157,6 +162,11 @@ class SceneObject:
             )
         if self.shape is Shape.PLANE and not self.is_zone:
             raise InputError(f"{self.name!r} is a plane, so it must be a zone.")
+        if self.crush_force is not None and not 0.0 < self.crush_force <= MAX_CRUSH_FORCE:
+            raise InputError(
+                f"The force that {self.name!r} bears must be over 0 and at most "
+                f"{MAX_CRUSH_FORCE:g} N, not {self.crush_force:g}."
+            )
         is_part = self.shape is not Shape.VESSEL and not (self.fixed or self.is_zone)
         if self.joint is not None and not is_part:
             raise InputError(
@@ -244,7 +254,7 @@ def _properties(scene_object: SceneObject) -> tuple[object, ...]:
     kind = (scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, key)
     flags = scene_object.can_be_held, scene_object.held, scene_object.fixed, scene_object.zone
     joint = None if scene_object.joint is None else scene_object.joint.key
-    return (*kind, *flags, scene_object.appearance, joint)
+    return (*kind, *flags, scene_object.appearance, joint, scene_object.crush_force)
 
 
 def placed(objects: tuple[SceneObject, ...], scene_object: SceneObject) -> tuple[SceneObject, ...]:

@@ -74,6 +74,7 @@ class Reason(Enum):
     LOPSIDED = "one finger only"
     SLIDING = "sliding"
     SLIPPED = "slipped"
+    CRUSHED = "crushed"
     SLOW_ZONE = "zone of reduced speed"
     INTERNAL = "internal error"
     RESTARTED = "restarted"
@@ -105,7 +106,9 @@ CAUSES = (
 )
 """The reasons for which the server itself stops or pauses the arm."""
 
-GRIPPER_REASONS = (Reason.GRIPPER_LIMIT, Reason.GRIPPER_SLIDE_LIMIT, Reason.SLIPPED)
+GRIPPER_REASONS = (
+    *(Reason.GRIPPER_LIMIT, Reason.GRIPPER_SLIDE_LIMIT, Reason.SLIPPED, Reason.CRUSHED),
+)
 """The reasons that concern only the fingers, until their next command."""
 
 
@@ -120,10 +123,12 @@ class Finding:
             stop, the travel of the tool, or else of any link, until rest [m]; for a plan, the
             distance of the arm from its start [rad]; for silence and lateness, the time [s]; for a
             tracking error and a measured stop, the angle of a joint [rad]; for an object that
-            slides or has slipped, its load [N]; for a zone, the maximum speed of the tool [m/s].
+            slides or has slipped, its load [N]; for one that was crushed, the force [N]; for a
+            zone, the maximum speed of the tool [m/s].
         axis: the axis that the finding concerns, counted from 0; None if it concerns no axis.
         parts: the two links or objects that the finding concerns; None if it concerns none.
         time: for a stop, the time until rest [s].
+        limit: for an object that was crushed, the force that it bears [N].
     """
 
     reason: Reason
@@ -131,6 +136,7 @@ class Finding:
     axis: int | None = None
     parts: tuple[str, str] | None = None
     time: float = 0.0
+    limit: float = 0.0
 
 
 class Verdict(Enum):

@@ -115,6 +115,8 @@ def _object_entry(
     ):
         if true:
             entry[name] = True
+    if scene_object.crush_force is not None:
+        entry["crush_force"] = scene_object.crush_force
     if scene_object.is_zone:
         entry["zone"] = scene_object.zone.value
     if scene_object.fixed:

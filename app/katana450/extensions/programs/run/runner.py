@@ -98,8 +98,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     try:
         if run.blocked > ACTION_TIMEOUT:
             raise InputError(f"The path is still blocked: {_met(state)} would collide.")
-        if run.held:
-            _check_slip(state)
+        _check_grip(state, held=run.held)
         done = task.action.done(state, run.waited)
     except InputError as error:
         why = f"Line {task.line}, {task.name}: {error}"
@@ -161,10 +160,11 @@ def skipped(program: Program, run: Run) -> tuple[int, ...]:
     return tuple(step + 1 for step in chain(program.idle, *others))
 
 
-def _check_slip(state: State) -> None:
-    """Raise InputError if the object that the fingers held slides, or has slipped out of them."""
+def _check_grip(state: State, *, held: bool) -> None:
+    """Raise InputError if an object was crushed, or slides or has slipped that was ``held``."""
+    reasons = (Reason.CRUSHED, *((Reason.SLIDING, Reason.SLIPPED) if held else ()))
     for finding in state.findings:
-        if finding.reason in (Reason.SLIDING, Reason.SLIPPED):
+        if finding.reason in reasons:
             raise InputError(f"{finding_text(finding)}.")
 
 

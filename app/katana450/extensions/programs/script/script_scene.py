@@ -16,6 +16,7 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.object_joint import ObjectJoint
 from katana450.arm.control.state.scene_objects import (
     MAX_COORDINATE,
+    MAX_CRUSH_FORCE,
     MAX_OBJECTS,
     MAX_SCALE,
     MIN_SCALE,
@@ -232,6 +233,9 @@ class SceneEntry(Declared):
     attach: Annotated[str, choice("hand", "world").about("hand: it moves with the hand")] = "world"
     joint: Annotated[JointEntry | None, record(JointEntry)] = None
     part_of: Annotated[str | None, TEXT.about("Object with a joint, with which it moves")] = None
+    crush_force: Annotated[
+        float | None, number(1e-3, MAX_CRUSH_FORCE, about="Force of the fingers it bears, N")
+    ] = None
 
     @classmethod
     def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -340,6 +344,7 @@ class SceneDraft(Declared):
                         fixed=entry.fixed,
                         zone=Zone(entry.zone_name),
                         joint=joint,
+                        crush_force=entry.crush_force,
                     )
                 )
             except InputError as error:

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from katana450.arm.control.objects.pouring import is_vessel
-from katana450.arm.control.state.messages import part
+from katana450.arm.control.state.messages import finding_text, part
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import Reason, State
 from katana450.errors import InputError
@@ -257,6 +257,9 @@ class Grasp(Step, word="grasp", example="cup"):
         held = with_fingers(plan.standing(q), plan.plan_context.arm.gripper.closed)
         if held.held is None or held.held.name != self.name:
             raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
+        for finding in held.findings:
+            if finding.reason is Reason.CRUSHED:
+                raise InputError(f"{finding_text(finding)}.")
         others = tuple(other for other in held.objects if other.name != self.name)
         world = plan.plan_context.session.world_at(replace(held, objects=others))
         nearest = None if world is None else _nearer(plan, world, held.x_setpoint, MARGIN)
