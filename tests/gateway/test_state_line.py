@@ -75,6 +75,14 @@ def test_two_nearest_parts_are_shown_below_30_mm(
     assert table.bar(table.driver())["clearance"] == shown
 
 
+def test_bar_says_plainly_that_no_path_was_found(table: Staged) -> None:
+    participant = table.driver()
+    table.arm.planning_failure = "The forearm meets the table."
+    line = table.bar(participant)
+    assert (line["mood"], line["headline"]) == ("limited", "No path found")
+    assert line["why"].startswith("The forearm meets the table.")
+
+
 def test_stop_is_in_progress_until_the_arm_rests(table: Staged) -> None:
     participant = table.driver()
     rest = table.arm.rest

@@ -74,8 +74,11 @@ def test_unknown_branch_is_refused_before_a_path_is_planned(session: Session) ->
     assert sink.commands == []
 
 
-def test_path_that_is_found_after_a_stop_is_not_followed(
-    session: Session, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("command", "notes"), [(cmd.Stop(), []), (cmd.Hold(), [planning_worker.SUPERSEDED])]
+)
+def test_path_that_is_found_after_another_command_is_not_followed(
+    session: Session, monkeypatch: pytest.MonkeyPatch, command: cmd.Command, notes: list[str]
 ) -> None:
     free, stopped = threading.Event(), threading.Event()
 
@@ -91,11 +94,14 @@ def test_path_that_is_found_after_a_stop_is_not_followed(
     worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
     worker.deliver(cmd.Branch(name="front-down"), None)
     assert free.wait(30.0)
-    worker.deliver(cmd.Stop(), None)
+    said: list[str] = []
+    worker.notify = said.append
+    worker.deliver(command, None)
+    assert said == notes
     (thread,) = (running for running in threading.enumerate() if running.name == "planning")
     stopped.set()
     thread.join(30.0)
-    assert sink.commands == [cmd.Stop()]
+    assert sink.commands == [command]
 
 
 PERSON = Actor(Person("1", "Ada", Role.OPERATOR), CommandChannel.PAGE)

@@ -27,6 +27,10 @@ REST_TIMEOUT = 5.0
 """[s] Timeout for the arm to come to rest before a plan starts."""
 
 
+SUPERSEDED = "The path that was being planned is dropped: another command came first."
+"""Sentence for people."""
+
+
 class PlanningWorker:
     """Command sink that plans the ``planned`` commands and passes all others on at once.
 
@@ -41,7 +45,7 @@ class PlanningWorker:
         self._lock = threading.Lock()
         self._work: threading.Event | None = None
         self.notify: Callable[[str], None] = log.warning
-        """Called with the reason if no path was found."""
+        """Called with the reason if no path was found, or if another command came first."""
         self.redirected: Callable[[], None] = lambda: None
         """Called, in any thread, when a command gives the arm another motion, a hold or a stop.
 
@@ -64,8 +68,11 @@ class PlanningWorker:
         """Implement ``CommandSink``. A command that is planned first gets no ticket of its own."""
         traits = [part.traits for part in command.parts]
         self.failure = ""
+        is_planning = self._work is not None
         if not all(part.passive for part in traits):
             self.cancel()
+            if is_planning and not any(part.safety for part in traits):
+                self.notify(SUPERSEDED)
         # The hold for a driver who has left. A run that another person ordered is still wanted.
         left = actor is not None and actor.grounds is Grounds.SERVER and command == cmd.Hold()
         if any(part.supersedes for part in traits) and not left:

@@ -65,9 +65,12 @@ def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:
     now = StatusLine("starting", "Starting", "")
     if state is not None:
         now = StatusLine(mood(state), headline(state), sentence(state))
-        plans = hub.arm is not None and hub.arm.busy and not state.moving and not state.paused
-        if plans and not hub.runner.running:
+        rests = not (state.moving or state.paused or hub.runner.running)
+        if hub.arm is not None and hub.arm.busy and rests:
             now = StatusLine("planning", "Planning a path", "The arm then follows it.")
+        elif hub.arm is not None and hub.arm.planning_failure and rests:
+            why = f"{hub.arm.planning_failure} {now.why}".rstrip()
+            now = StatusLine("limited", "No path found", why)
         if state.status not in FIRST:
             now = hub.runner.status_line(state, now, reader)
     if stopped is not None:
