@@ -7,6 +7,7 @@ const API = "api/v1/";
 const UNREACHABLE = "The server does not answer. Try again.";
 const ALONE = /\.(stl|ply|glb|3mf|zip)$/i; // what needs no other file
 const TOGETHER = "Files that belong together, such as a .gltf and its .bin, or a folder, are read from a .zip: put them into one.";
+const [ROBOT, ROBOT_INSIDE] = [/\.(urdf|xacro)$/i, /\.(urdf|xacro)/i]; // in a name, and in the names in a .zip file
 const MAX_BYTES = 60e6; // of a file; the server accepts no more
 const TAIL = 200_000; // bytes at the end of a .zip file in which the names of its files are
 /** @type {Page.Say} */
@@ -125,26 +126,25 @@ export async function show(shown) {
   chosen.watch(!byId("objects").hidden);
 }
 
-// Read files that were chosen or dropped, each of which is an object, or a scene in a .zip file. `at` is the point of the
-// table on which they were dropped.
+// Read files that were chosen or dropped, each of which is an object, or a scene or a robot in a .zip file. `at` is the
+// point of the table on which they were dropped.
 /** @param {File[]} list @param {[number, number] | null} [at] */
 export async function take(list, at = null) {
-  const robot = list.find(({ name }) => /\.(urdf|xacro)$/i.test(name));
+  const names = await Promise.all(list.map(namesIn));
+  const isScene = names.map((all) => all.includes("scene.yaml"));
+  const robot = list.find((file, i) => ROBOT.test(file.name) || (ROBOT_INSIDE.test(names[i]) && !isScene[i]));
   if (robot) return chooseRobot(robot);
   where = at;
   if (byId("objects").hidden) byId("objects-button").click();
   const isFolder = list.length === 1 && !list[0].name.includes(".");
   if (isFolder || (list.length > 1 && !list.every(({ name }) => ALONE.test(name)))) return report(TOGETHER, true);
-  for (const next of list) {
-    if (/\.zip$/i.test(next.name) && (await isScene(next))) await load(next);
-    else await read(next);
-  }
+  for (const [i, next] of list.entries()) await (isScene[i] ? load(next) : read(next));
 }
 
-/** Return whether a .zip file holds a scene. @param {File} archive */
-async function isScene(archive) {
-  const tail = await archive.slice(-TAIL).arrayBuffer();
-  return new TextDecoder("latin1").decode(tail).includes("scene.yaml");
+/** Return a text with the names of the files in a .zip file; empty for another file. @param {File} file */
+async function namesIn(file) {
+  if (!/\.zip$/i.test(file.name)) return "";
+  return new TextDecoder("latin1").decode(await file.slice(-TAIL).arrayBuffer());
 }
 
 /** @param {File} first */

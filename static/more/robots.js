@@ -45,12 +45,13 @@ function choose(robot, values = {}) {
   page?.say({ do: "choose_robot", robot: robot.name, arguments: values, id: "robot" });
 }
 
-/** Ask for the values of the arguments of a xacro file, which has `robot.arguments`. @param {Robot} robot */
-function ask(robot) {
+// Ask for the values of the arguments of a xacro file, which has `robot.arguments`, and whether to drive a dropped one.
+/** @param {Robot} robot */
+function ask(robot, isDropped = false) {
   const boxes = Object.entries(robot.arguments ?? {}).map(([name, value]) => ({ name, input: html("input", { name, value }) }));
-  if (!boxes.length) return choose(robot);
+  if (!boxes.length && !isDropped) return choose(robot);
   details.replaceChildren(
-    html("p", {}, `Arguments of ${robot.title}`),
+    html("p", {}, boxes.length ? `Arguments of ${robot.title}` : robot.title),
     ...boxes.map(({ name, input }) => html("label", {}, html("span", {}, name), input)),
     html("button", { class: "main" }, "Drive it"),
   );
@@ -90,19 +91,19 @@ async function load() {
 }
 
 /** @param {File} file */
-async function upload(file, main = "") {
+async function upload(file, main = "", isDropped = false) {
   report(`${file.name} is being sent…`);
   try {
     const answer = await fetch(`${PATH}?${new URLSearchParams({ name: file.name, main })}`, { method: "POST", body: file });
     const { robot, why, choices } = await answer.json();
     if (choices) {
       report(why);
-      return list.replaceChildren(...choices.map((/** @type {string} */ path) => button(path, () => upload(file, path))));
+      return list.replaceChildren(...choices.map((/** @type {string} */ path) => button(path, () => upload(file, path, isDropped))));
     }
     if (!answer.ok) return report(why);
     report("");
     await load();
-    ask(robot);
+    ask(robot, isDropped);
   } catch (error) {
     report(`${file.name} was not sent: ${messageOf(error)}`);
   }
@@ -129,7 +130,7 @@ export async function toggle(options) {
   details.hidden = true;
   if (!box.open) box.show();
   await load();
-  if (options.file) upload(options.file);
+  if (options.file) upload(options.file, "", true);
 }
 
 // Report the refusal of a request of this dialog.

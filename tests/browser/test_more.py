@@ -18,6 +18,7 @@ from tests.browser.session import Truth, bar
 from tests.browser.sight import contrast
 from tests.browser.sizes import PHONE, PORTRAIT
 from tests.browser.test_accessibility import findings
+from tests.browser.test_objects import drop, zipped
 from tests.extensions.test_robot_choice import urdf
 
 
@@ -119,8 +120,6 @@ def test_another_robot_is_opened_and_every_window_loads_again(
     open_page: OpenPage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, artefacts: Path
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    arm = tmp_path / "small.urdf"
-    arm.write_bytes(urdf())
     with AppServer(APP) as server:
         windows = [open_page(server.url, drawing=Drawing.NONE) for _ in range(2)]
         page = windows[0].page
@@ -132,7 +131,10 @@ def test_another_robot_is_opened_and_every_window_loads_again(
         assert findings(page) == []
         windows[0].keep(artefacts / "robots.png")
         starts = [window.page.evaluate("performance.timeOrigin") for window in windows]
-        page.set_input_files("#robots input[type=file]", arm)
+        page.locator("#robots").get_by_role("button", name="Close").click()
+        # A dropped archive of a robot is no object, and is driven only when a person says so.
+        drop(windows[0], small_zip=zipped({"small/small.urdf": urdf()}))
+        page.get_by_role("button", name="Drive it").click()
         for window, time_origin in zip(windows, starts, strict=True):
             window.page.wait_for_function(
                 "(begun) => performance.timeOrigin > begun", arg=time_origin, timeout=40_000
