@@ -24,11 +24,9 @@ export class Content {
     this.#storage = storage;
     this.#key = `${KEY} ${arm.name}`;
     this.#listener = listener;
-    const joints = arm.joints.length;
     try {
-      // Earlier versions kept one list, of poses with five joints.
-      const json = storage.getItem(this.#key) ?? (joints === 5 ? storage.getItem(KEY) : null);
-      if (json) this.now = restored(json, joints);
+      const json = storage.getItem(this.#key);
+      if (json) this.now = restored(json, arm.joints.length);
     } catch {
       this.broken = true;
     }

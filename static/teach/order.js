@@ -1,27 +1,36 @@
-// Drag a row of a list to another place by its handle, as the browser drags.
+// Drag a row of a list to another place by its handle, with a mouse, a pen or a finger.
 /** @typedef {(row: HTMLElement, to: number, over: HTMLElement, after: boolean) => void} Drop */
-/** @type {{ row: HTMLElement, drop: Drop } | null} */
-let dragged = null;
+const MOVED = 5; // px, below which a press is no drag
 
 // `drop` is called with the row, the index among the other rows at which it was released, the row below the pointer, and
 // whether it is after that.
 /** @param {HTMLElement} row @param {HTMLElement} handle @param {Drop} drop */
 export function draggable(row, handle, drop) {
-  handle.draggable = true;
-  handle.addEventListener("dragstart", ({ dataTransfer }) => {
-    dragged = { row, drop };
-    dataTransfer?.setDragImage(row, 0, 0);
+  handle.classList.add("grip");
+  handle.addEventListener("pointerdown", ({ button, clientY: start, pointerId }) => {
+    if (button) return;
+    handle.setPointerCapture(pointerId);
+    const others = [...(row.parentElement?.children ?? [])].filter((other) => other !== row);
+    /** @type {{ over: HTMLElement, after: boolean } | null} */
+    let place = null;
+    /** @param {typeof place} next */
+    const mark = (next) => {
+      place?.over.classList.remove("before", "after");
+      place = next;
+      place?.over.classList.add(place.after ? "after" : "before");
+    };
+    handle.onpointermove = ({ clientY }) => {
+      if (Math.abs(clientY - start) < MOVED) return mark(null);
+      const over = /** @type {HTMLElement | undefined} */ (others.find((other) => clientY < other.getBoundingClientRect().bottom) ?? others.at(-1));
+      if (!over) return;
+      const { top, height } = over.getBoundingClientRect();
+      mark({ over, after: clientY > top + height / 2 });
+      over.scrollIntoView({ block: "nearest" });
+    };
+    handle.onpointerup = () => place && drop(row, others.indexOf(place.over) + Number(place.after), place.over, place.after);
+    handle.onlostpointercapture = () => {
+      mark(null);
+      handle.onpointermove = handle.onpointerup = null;
+    };
   });
-  handle.addEventListener("dragend", () => (dragged = null));
-  for (const kind of /** @type {const} */ (["dragover", "dragleave", "drop"]))
-    row.addEventListener(kind, (event) => {
-      if (!dragged || dragged.row === row) return;
-      event.preventDefault();
-      const { top, height } = row.getBoundingClientRect();
-      const after = event.clientY > top + height / 2;
-      row.classList.toggle("before", kind === "dragover" && !after);
-      row.classList.toggle("after", kind === "dragover" && after);
-      const others = [...(row.parentElement?.children ?? [])].filter((other) => other !== dragged?.row);
-      if (kind === "drop") dragged.drop(dragged.row, others.indexOf(row) + Number(after), row, after);
-    });
 }

@@ -238,7 +238,7 @@ export class Steps {
     set(pause, "aria-pressed", numbers.length > 0 && numbers.every((step) => this.#sheet.plan.breakpoints.includes(step)));
     set(run, "aria-label", isOne ? `Run from step ${numbers[0]}` : `Run from: ${title}`);
     pause.hidden = run.hidden = !numbers.length;
-    number.draggable = indent !== null;
+    number.classList.toggle("grip", indent !== null);
     write(number, numbers.length ? String(numbers[0]) : "");
     write(name, title);
     const times = round >= 0 && !isOne ? `${round + 1} of ${numbers.length}` : "";

@@ -14,6 +14,7 @@ from katana450.extensions.programs.script.blocks import TextBlock, blocks_of
 from katana450.extensions.programs.script.script import parse
 from tests.browser.bare_page import ORIGIN, bare_page
 from tests.browser.conftest import OpenPage
+from tests.browser.finger import fingers, middle
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, take
@@ -180,11 +181,20 @@ def test_steps_are_edited_and_undone_and_the_text_follows(
 
 
 @pytest.mark.long
-def test_step_is_dragged_into_a_block(sheet: ViserPage) -> None:
+@pytest.mark.parametrize("touch", [False, True])
+def test_step_is_dragged_into_a_block(sheet: ViserPage, touch: bool) -> None:
     show(sheet, SCRIPT)
     rows = sheet.page.locator("#teach .steps li")
     sheet.wait_until(lambda: rows.count() == 6, "the steps")
-    rows.nth(5).locator("b").drag_to(rows.nth(3), target_position={"x": 60, "y": 2})
+    if touch:
+        grip, over = rows.nth(5).locator("b"), rows.nth(3).bounding_box()
+        assert over is not None
+        with fingers(sheet.page) as hand:
+            hand.put(middle(grip))
+            hand.move((over["x"] + 20.0, over["y"] + 2.0))
+            hand.lift()
+    else:
+        rows.nth(5).locator("b").drag_to(rows.nth(3), target_position={"x": 60, "y": 2})
     home = "        - home\n        - wait"
     wait_text(sheet, SCRIPT.replace("\n  - home", "").replace("        - wait", home))
 
