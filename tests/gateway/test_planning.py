@@ -21,7 +21,7 @@ from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.server import program_planner
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint
-from katana450.server.api.program_requests import ProgramOrder
+from katana450.server.api.program_requests import Preview, ProgramOrder
 from katana450.server.service.participants import Participant
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import SCRIPT, Staged
@@ -200,6 +200,20 @@ def test_planning_of_a_departed_owner_is_cancelled(table: Staged, slow: Slow) ->
     finish(table, other, slow)
     progress = table.progress
     assert (progress.status, progress.by) == ("ready", other.person.name)
+
+
+def test_preview_ends_with_the_window_that_made_it(table: Staged, slow: Slow) -> None:
+    participant, other = (table.join(page) for page in PAGES)
+    ask(table, participant, then=None)
+    finish(table, participant, slow)
+    table.programs.handle(participant, Preview(at=0.1))
+    table.wait(0.1, participant, other)
+    assert table.programs.look_time > 0.0
+    assert table.programs.drawn is not None
+    table.hub.leave(participant)
+    table.wait(0.1, other)
+    assert table.programs.look_time == 0.0
+    assert table.programs.drawn is None
 
 
 def test_kept_plan_is_run_without_planning_again(table: Staged, slow: Slow) -> None:

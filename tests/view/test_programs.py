@@ -38,7 +38,7 @@ class Runner:
     """The part of a program runner that a preview follows."""
 
     def __init__(self) -> None:
-        self.program: Program | None = None
+        self.drawn: Program | None = None
         self.begun = self.running = False
         self.look_time = 0.0
         self.show_preview: Callable[[], object] = lambda: None
@@ -88,7 +88,7 @@ class Stage:
     def follow(
         self, program: Program | None, *, has_begun: bool = False, running: bool = False
     ) -> None:
-        self.runner.program = program
+        self.runner.drawn = program
         self.runner.begun, self.runner.running = has_begun, running
         self.shown.follow()
 

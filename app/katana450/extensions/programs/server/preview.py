@@ -316,7 +316,7 @@ class ProgramPreview:
 
     def follow(self) -> None:
         """Draw a new program, and hide the preview once it runs or the arm is driven after it."""
-        program, has_begun = self._runner.program, self._runner.begun
+        program, has_begun = self._runner.drawn, self._runner.begun
         if program is not self._drawn or (self._begun and not has_begun):
             self._drawn = program
             self._preview.show(program, self._state())

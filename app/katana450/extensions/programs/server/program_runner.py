@@ -67,8 +67,8 @@ class ProgramRunner(Runner):
         self._is_news = False  # Whether no other command followed the end of a run or planning.
         self._runs_as: ProgramParticipant | None = None
         self._run: Run | None = None
-        # The program whose preview was looked at last, and the time [s].
-        self._looked: tuple[Program | None, float] = None, 0.0
+        # The program whose preview was looked at last, the time [s], and by whom.
+        self._looked: tuple[Program | None, float, Participant | None] = None, 0.0, None
         self.show_preview: Callable[[], object] = lambda: None
         """Called in the server's thread when ``look_time`` has changed by a request."""
         self.follow_run: FollowRun = lambda *_: None
@@ -83,6 +83,11 @@ class ProgramRunner(Runner):
     def program(self) -> Program | None:
         """The planned program."""
         return self.planner.program
+
+    @property
+    def drawn(self) -> Program | None:
+        """The program whose path is drawn; None once the owner of a program at rest has left."""
+        return self.program if self.running or self._owner.is_here else None
 
     @property
     def begun(self) -> bool:
@@ -213,6 +218,10 @@ class ProgramRunner(Runner):
         hub, t = self.hub, self.hub.clock()
         if self.waits and self._owner.is_silent(t):
             self.planner.forget_run("its owner sends no heartbeats")
+        viewer = self._looked[2]
+        if viewer is not None and viewer not in hub.participants:
+            self._looked = None, 0.0, None
+            self.show_preview()
         if self._left_tool is not None:
             self._left_tool = self._left_tool.restored(hub)
         if self.program is not None and self.waits:
@@ -279,7 +288,7 @@ class ProgramRunner(Runner):
     @property
     def look_time(self) -> float:
         """Time [s] of the preview that the scene shows; 0 for none, as while the program runs."""
-        program, t = self._looked
+        program, t, _ = self._looked
         return t if program is self.program and not self.begun else 0.0
 
     def _look_at(self, participant: Participant, t: float) -> None:
@@ -291,7 +300,7 @@ class ProgramRunner(Runner):
         assert program is not None
         if program.preview_time <= 0.0 or self.begun:
             raise LeaseError("There is no preview. Plan the program from its beginning first.")
-        self._looked = program, min(t, program.preview_time)
+        self._looked = program, min(t, program.preview_time), participant
         self.show_preview()
 
     def status_line(self, state: State, line: StatusLine, reader: Person | None) -> StatusLine:
