@@ -240,8 +240,7 @@ export const viewsIn = (messages) =>
   );
 
 /** Return messages that give the page's camera a view of `viewOf`. @param {ViserPage.View} view */
-export const viewing = ({ position, look_at, up_direction }) => [
-  { type: "SetCameraUpDirectionMessage", position: up_direction, initial: false },
+export const viewing = ({ position, look_at }) => [
   { type: "SetCameraLookAtMessage", look_at, initial: false },
   { type: "SetCameraPositionMessage", position, initial: false },
 ];

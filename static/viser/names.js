@@ -12,7 +12,7 @@ export const PANEL_GROUND = "var(--mantine-color-body)";
 // The hint of a control, which lies over other ones.
 export const HINT = "[role=tooltip]";
 // Its notice that it draws by software, which would cover the scene. The banner says so where that makes the picture old.
-export const SOFTWARE_NOTICE = ".mantine-Notification-root[style*=orange]";
+export const SOFTWARE_NOTICE = "[role=alert][style*=orange]";
 // viser draws faintly until the light of the room is loaded. If drawing takes as long as that, viser
 // miscounts and the picture stays faint. It also starts with the light theme. Without controls from
 // the server, as before each connection, its panel shows settings for developers. Its ground is that of the page.

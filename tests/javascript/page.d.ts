@@ -73,7 +73,7 @@ declare namespace Page {
   }
 
   /** A view of the camera, in m of viser's world. */
-  interface View { position: number[]; look_at: number[]; up_direction?: number[]; }
+  interface View { position: number[]; look_at: number[]; }
 }
 
 /** The parts of three.js that the page uses. */
@@ -131,14 +131,14 @@ declare namespace ViserPage {
   /** A message between viser's page and its server; a type has some of the fields. */
   interface Message {
     type: string; uuid?: string; name?: string; visible?: boolean; props?: ControlProps; updates?: ControlProps;
-    position?: number[]; wxyz?: number[]; look_at?: number[]; up_direction?: number[]; initial?: boolean; count?: number;
+    position?: number[]; wxyz?: number[]; look_at?: number[]; initial?: boolean; count?: number;
     dark_mode?: boolean; rgb_data?: Uint8Array; made?: number;
   }
   interface ControlProps { label?: string; value?: string; step?: number; min?: Limit; max?: Limit; }
   type Limit = number | number[] | null;
 
   /** The camera of a message of the page. */
-  type View = Message & { position: number[]; look_at: number[]; up_direction: number[]; };
+  type View = Message & { position: number[]; look_at: number[]; };
 
   /** A connection between viser's page and its server. */
   interface Connection { say(message: Message): void; show(messages: Message[]): void; }
