@@ -45,8 +45,7 @@ function choose(robot, values = {}) {
   page?.say({ do: "choose_robot", robot: robot.name, arguments: values, id: "robot" });
 }
 
-// Ask for the values of the arguments of a xacro file, which has `robot.arguments`, and whether to drive a dropped one.
-/** @param {Robot} robot */
+/** Ask for the values of the arguments of a xacro file, and whether to drive a dropped robot. @param {Robot} robot */
 function ask(robot, isDropped = false) {
   const boxes = Object.entries(robot.arguments ?? {}).map(([name, value]) => ({ name, input: html("input", { name, value }) }));
   if (!boxes.length && !isDropped) return choose(robot);

@@ -15,6 +15,9 @@ const SOLID = ["/arm", "/cup", "/basin", "/objects", TABLE]; // nodes that a ray
 const OBJECTS = ["/cup", "/basin"]; // nodes of objects; the others are below the next one
 const MORE = "/objects";
 
+/** @param {MouseEvent} event @returns {Page.Pixel} */
+const pixelOf = ({ clientX, clientY }) => [clientX, clientY];
+
 export class Stage {
   #stage;
   #scene;
@@ -119,8 +122,7 @@ export class Stage {
     this.handle.note(event);
     this.#press = null;
     if (button || !isPrimary || this.joints.dragging || !matches(target, "canvas")) return;
-    /** @type {Page.Pixel} */
-    const pixel = [event.clientX, event.clientY];
+    const pixel = pixelOf(event);
     this.#press = pixel;
     this.handle.light(sceneIn(this.#scene).partAt(pixel));
     const hit = this.#pick(pixel);
@@ -134,8 +136,7 @@ export class Stage {
 
   /** @param {PointerEvent} event */
   #move(event) {
-    /** @type {Page.Pixel} */
-    const pixel = [event.clientX, event.clientY];
+    const pixel = pixelOf(event);
     this.handle.note(event);
     if (this.joints.holds(event.pointerId)) {
       event.stopImmediatePropagation();
@@ -186,8 +187,7 @@ export class Stage {
 
   /** @param {PointerEvent} event */
   #up(event) {
-    /** @type {Page.Pixel} */
-    const pixel = [event.clientX, event.clientY];
+    const pixel = pixelOf(event);
     if (this.joints.holds(event.pointerId) && this.joints.release()) this.#press = null;
     const press = this.#press;
     this.#press = null;
@@ -208,8 +208,8 @@ export class Stage {
   }
 
   /** Look at the point of a part or an object under the pointer. @param {MouseEvent} event */
-  #focus({ target, clientX, clientY }) {
-    const hit = matches(target, "canvas") && this.#pick([clientX, clientY]);
+  #focus(event) {
+    const hit = matches(event.target, "canvas") && this.#pick(pixelOf(event));
     if (hit) this.#views.focus(hit.point);
   }
 

@@ -8,9 +8,9 @@ const MOVED = 5; // px, below which a press is no drag
 export function draggable(row, handle, drop) {
   handle.classList.add("grip");
   handle.addEventListener("pointerdown", ({ button, clientY: start, pointerId }) => {
-    if (button) return;
-    handle.setPointerCapture(pointerId);
     const others = [...(row.parentElement?.children ?? [])].filter((other) => other !== row);
+    if (button || !others.length) return;
+    handle.setPointerCapture(pointerId);
     /** @type {{ over: HTMLElement, after: boolean } | null} */
     let place = null;
     /** @param {typeof place} next */
@@ -21,8 +21,7 @@ export function draggable(row, handle, drop) {
     };
     handle.onpointermove = ({ clientY }) => {
       if (Math.abs(clientY - start) < MOVED) return mark(null);
-      const over = /** @type {HTMLElement | undefined} */ (others.find((other) => clientY < other.getBoundingClientRect().bottom) ?? others.at(-1));
-      if (!over) return;
+      const over = /** @type {HTMLElement} */ (others.find((other) => clientY < other.getBoundingClientRect().bottom) ?? others.at(-1));
       const { top, height } = over.getBoundingClientRect();
       mark({ over, after: clientY > top + height / 2 });
       over.scrollIntoView({ block: "nearest" });
