@@ -211,9 +211,7 @@ class SceneEntry(Declared):
     ]
     size: Annotated[
         tuple[float, ...],
-        SIZES.about(
-            "mm. box: x, y, z; plane: x, y; cylinder, vessel: radius, height; sphere: radius"
-        ),
+        SIZES.about("mm. box: x, y, z; plane: x, y; sphere: radius; others: radius, height"),
     ] = ()
     mesh: Annotated[MeshFile | None, record(MeshFile)] = None
     T: Annotated[

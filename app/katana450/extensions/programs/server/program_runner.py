@@ -218,8 +218,7 @@ class ProgramRunner(Runner):
         hub, t = self.hub, self.hub.clock()
         if self.waits and self._owner.is_silent(t):
             self.planner.forget_run("its owner sends no heartbeats")
-        viewer = self._looked[2]
-        if viewer is not None and viewer not in hub.participants:
+        if self._looked[2] not in (None, *hub.participants):
             self._looked = None, 0.0, None
             self.show_preview()
         if self._left_tool is not None:
