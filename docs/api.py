@@ -38,7 +38,7 @@ number or a text of your own; its answer has the same `id`. Without an `id` only
 | **websocket** `/api/v{version}/socket?name=NAME` | Requests from the client; answers and states from the server. |
 | **TCP**, one JSON object per line | `katana450 serve --lines PORT`, for programs on the same machine. The first line is a `hello`. STOP also has a [port of its own](access.md#the-port-of-stop), which `stop_port` in the `welcome` names. |
 | **HTTP** `POST /api/v{version}/do` | One request. The header `X-Program` identifies the program by a secret key of 16 to 64 letters and digits that the program chooses. `X-Name` is the name that others see. |
-| **HTTP** `GET /api/v{version}/state`, `arm`, `branches`, `loop`, `objects`, `world`, `links` | The answers of `query`. |
+| **HTTP** `GET /api/v{version}/state`, `arm`, `branches`, `loop`, `objects`, `world` | The answers of `query`. |
 | **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | Upload of a .wrl, .stl, .obj, .ply, .glb, .gltf or .3mf file. `place` uses it by the key in the answer. |
 | **HTTP** `GET`, `POST /api/v{version}/scene` | Download and upload of the scene as a .zip ([scenes](scenes.md)). An uploaded scene waits for a `load`. |
 | **HTTP** `GET /api/v{version}/scripts`, `scripts/NAME` | The names of the scripts of the folder of `--programs`, and of those of the library that the arm can do, and an example of each step; the text of one, such as `Pour`, for `program`. |

@@ -18,7 +18,6 @@ about = [0, 0, 1; 0, 1, 0; 0, 1, 0; 0, 1, 0; 1, 0, 0];
 angles = 2 * pi * (0:places - 1)' / places;
 
 arm = katana_open (port, "VR Sink");
-katana_set (arm, {"upper_arm_link_paint"}, "diffuseColor", [0.1, 0.5, 0.9]);
 asked = zeros (places, 5);
 heard = zeros (places, 5);
 for k = 1:places
@@ -28,12 +27,10 @@ for k = 1:places
   rotations = katana_get (arm, axes, "rotation");
   heard(k, :) = rotations(:, 4)';
 end
-colour = katana_get (arm, {"upper_arm_link_paint"}, "diffuseColor");
-katana_set (arm, {"upper_arm_link_look"}, "whichChoice", 0);
 katana_say (arm, struct ("do", "release_lease", "id", 2));
 katana_hear (arm, "done");
 clear arm
 
-result = struct ("angles", angles, "asked", asked, "heard", heard, "colour", colour, ...
+result = struct ("angles", angles, "asked", asked, "heard", heard, ...
                  "largest_difference_rad", max (abs (asked(:) - heard(:))));
 printf ("%s\n", jsonencode (result));

@@ -15,7 +15,6 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Command, Traits, classes_of
 from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.appearance import AppearanceTrait
 from katana450.arm.control.state.arm_report import ArmAct
 from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Shape
 from katana450.arm.control.state.state import Finding, Reason, State
@@ -111,8 +110,7 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
         *(cmd.Tool("flange"), cmd.SetPriority(Priority.PITCH), cmd.Fill(100.0)),
         *(cmd.Follow(plan_to(arm, None, state, q)), cmd.PlaceObject(BALL)),
         *(cmd.Attach("ball", Attachment.WORLD), cmd.ReplaceScene((BALL,))),
-        *(cmd.SetAppearance("ball", AppearanceTrait.CHOICE, 0), cmd.OperateArm(ArmAct.UNBLOCK)),
-        *(cmd.Batch((cmd.Home(),)), cmd.RestoreState(state)),
+        *(cmd.OperateArm(ArmAct.UNBLOCK), cmd.Batch((cmd.Home(),)), cmd.RestoreState(state)),
     ]
     kinds: dict[Any, Any] = {type(command): command for command in commands}
     return [kinds.get(kind) or plain_example(kind) for kind in KINDS]

@@ -10,7 +10,6 @@ import pytest
 from katana450.arm.control.arm import JointSet
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.appearance import AppearanceTrait, DisplayMode
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.errors import InputError
 from tests.ticks import during, rested
@@ -61,11 +60,9 @@ def test_stop_takes_the_reported_distance_and_holds_until_cleared(
     np.testing.assert_allclose(rest.q, stopped.goal, rtol=0, atol=1e-9)
     far = np.abs(moving.setpoint - rest.q).max()
     assert stopped.stopped.way == pytest.approx(far, abs=1e-9)
-    ignored = during(
-        session, rest, 0.5, cmd.Home(), cmd.SetAppearance("a", AppearanceTrait.CHOICE, -1)
-    )[-1]
+    ignored = during(session, rest, 0.5, cmd.Home(), cmd.Speed(0.5))[-1]
     np.testing.assert_array_equal(ignored.q, rest.q)
-    assert ignored.appearance.of("a").choice is DisplayMode.HIDDEN
+    assert ignored.speed == 0.5
     free = during(session, ignored, 0.5, cmd.ClearStop())[-1]
     assert (free.stopped, free.findings, free.moving) == (None, (), False)
     home = rested(session, free, cmd.Home())

@@ -14,7 +14,6 @@ from katana450.arm.control.commands.act import classes_of
 from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.transitions import TABLE, Effect, effect_of, row_of
-from katana450.arm.control.state.appearance import AppearanceTrait
 from katana450.arm.control.state.modes import (
     MODES,
     Following,
@@ -78,7 +77,6 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
         cmd.Attach: lambda: cmd.Attach("cup", Attachment.WORLD),
         cmd.ReplaceScene: lambda: cmd.ReplaceScene(objects),
         cmd.MoveObject: lambda: cmd.MoveObject("cup", np.array([0.3, 0.35, 0.0])),
-        cmd.SetAppearance: lambda: cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1),
         cmd.Batch: lambda: cmd.Batch((cmd.Speed(0.5),)),
         cmd.Jog: lambda: cmd.Jog(np.array([0.0, 0.05, 0.0, 0.0, 0.0])),
     }

@@ -66,4 +66,3 @@ def test_octave_turns_the_vrml_world_by_name_and_reads_it_back(
     assert len(output["angles"]) == 6
     check_kinematics(arm, output["angles"], output["asked"])
     np.testing.assert_allclose(output["heard"], output["asked"], rtol=0, atol=1e-9)
-    assert output["colour"] == [0.1, 0.5, 0.9]

@@ -118,7 +118,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
             requests.Place(name="ball", T=place, shape=requests.Shape.SPHERE, size=[0.02])
         ],
         requests.Attach: [requests.Attach(name="ball", to=requests.Attachment.WORLD)],
-        requests.Set: [requests.Set(node="cup_look", field="whichChoice", value=0)],
+        requests.Set: [requests.Set(node="cup", field="rotation", value=[0, 0, 1, 0])],
         requests.Remove: [requests.Remove(name="ball")],
         requests.Undo: [requests.Undo()],
         requests.Redo: [requests.Redo()],

@@ -42,7 +42,7 @@ declare namespace Api {
     wait?: number | null; }
   interface Field { field: string; type: string; value: number | number[]; settable: boolean; }
   interface FieldName { node: string; field: string; }
-  interface FieldSetting { node: string; field: string; value: number | number[] | null; }
+  interface FieldSetting { node: string; field: string; value: number[]; }
   interface Fill { do: "fill"; ml: number; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
   interface Finding { reason: string; text: string; amount: number | null; unit: string | null; axis: number | null;
@@ -142,7 +142,7 @@ declare namespace Api {
   interface Servo { do: "servo"; q: number[]; qd?: number[] | null; gripper?: number | null;
     id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface Set { do: "set"; id?: number | string | null; revocations?: number | null; made?: number | null;
-    wait?: number | null; node: string; field: string; value: number | number[] | null; more?: FieldSetting[]; }
+    wait?: number | null; node: string; field: string; value: number[]; more?: FieldSetting[]; }
   interface SetPriority { do: "set_priority"; priority: Priority; id?: number | string | null;
     revocations?: number | null; made?: number | null; }
   type Shape = "box" | "cylinder" | "mesh" | "plane" | "sphere" | "vessel";

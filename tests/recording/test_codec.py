@@ -349,6 +349,7 @@ def test_error_names_the_place_and_the_fault(text: bytes, expected: str) -> None
 
 CAUSE = Finding(Reason.WAITING)
 CAUSE_FORM = {"reason": "WAITING", "amount": 0.0, "axis": None, "parts": None, "time": 0.0}
+PAINT = {"is": "set_appearance", "name": "cup", "trait": "CHOICE", "value": -1}
 SAMPLE = {"is": "Servo", "q": [0.1, 0.2], "qd": None, "gripper": None}
 
 
@@ -367,6 +368,8 @@ SAMPLE = {"is": "Servo", "q": [0.1, 0.2], "qd": None, "gripper": None}
         ({"is": "SpeedScale", "value": 0.5}, cmd.Speed(0.5)),
         ({"is": "attach", "name": "cup", "to": "TABLE"}, cmd.Attach("cup", Attachment.WORLD)),
         ({"is": "offer_detour", "plan": "0123"}, cmd.Batch(())),
+        ({**PAINT, "is": "SetAppearance"}, cmd.Batch(())),
+        ({"is": "batch", "commands": [PAINT, {"is": "home"}]}, cmd.Batch((cmd.Home(),))),
         ({"is": "Fill", "volume": ML * 100.0}, cmd.Fill(100.0)),
         ({"is": "Hold", "finding": None}, cmd.Hold()),
         ({"is": "Pause", "finding": CAUSE_FORM}, cmd.PauseFor(CAUSE)),
@@ -382,6 +385,12 @@ SAMPLE = {"is": "Servo", "q": [0.1, 0.2], "qd": None, "gripper": None}
 def test_commands_of_older_versions_are_read(form: dict[str, Any], expected: cmd.Command) -> None:
     command = Codec().decoded(cmd.Command, form)
     assert text_of(command) == text_of(expected)
+
+
+def test_state_of_a_version_that_painted_links_is_read_and_has_its_digest(state: State) -> None:
+    painted = Codec().encoded(state) | {"appearance": {"changed": [["cup", {"choice": "HIDDEN"}]]}}
+    assert text_of(Codec().decoded(State, painted)) == text_of(state)
+    assert b"\x81\xa7changed\x90" in Digester().content(state)
 
 
 def test_detour_of_an_older_version_is_read_as_a_plan_that_is_followed() -> None:

@@ -353,7 +353,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
         self,
         node: str,
         field: str,
-        value: float | list[float] | None,
+        value: list[float],
         more: tuple[FieldSetting, ...] = ...,
     ) -> AtRest:
         """Set fields of the VRML world by the DEF names of their nodes, as VR Sink does.
@@ -365,7 +365,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
         Args:
             node: DEF name of the node.
             field: Name of the field.
-            value: New value. Null restores the original colour, transparency or choice.
+            value: New value.
             more: Further fields to set at the same time.
         """
 

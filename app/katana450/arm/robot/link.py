@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.robot.surfaces import VisualMesh, main_colour, shapes_of
+from katana450.arm.robot.surfaces import VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual
 from katana450.caching import cached_property
 from katana450.maths.geometry import se3, so3
@@ -177,8 +177,3 @@ class Link:
     def shapes(self) -> tuple[VisualMesh, ...]:
         """All surfaces of the link's visuals; see `shapes_by_visual`."""
         return tuple(itertools.chain.from_iterable(self.shapes_by_visual))
-
-    @cached_property
-    def colour(self) -> tuple[float, float, float]:
-        """Colour (sRGB, 0..1) of the largest part of the link's surface; PLAIN without shapes."""
-        return main_colour(self.shapes)

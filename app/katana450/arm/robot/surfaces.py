@@ -172,28 +172,10 @@ class VisualMesh:
     faces: npt.NDArray[np.int64]
 
     @cached_property
-    def area(self) -> float:
-        """Area of all triangles [m^2]."""
-        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
-        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-
-    @cached_property
     def corners(self) -> FloatArray:
         """(8, 3) corners of the bounding box [m]."""
         ends = (self.vertices.min(axis=0), self.vertices.max(axis=0))
         return np.array(list(itertools.product(*np.transpose(ends).tolist())))
-
-
-PLAIN = (0.8, 0.8, 0.8)
-"""Default colour of VRML."""
-
-
-def main_colour(shapes: Sequence[VisualMesh]) -> tuple[float, float, float]:
-    """Return the colour (sRGB, 0..1) of the largest part of the surface; PLAIN without shapes."""
-    areas: dict[Material, float] = {}
-    for shape in shapes:
-        areas[shape.material] = areas.get(shape.material, 0.0) + shape.area
-    return max(areas, key=areas.__getitem__).colour if areas else PLAIN
 
 
 def shapes_of(visual: Visual) -> Sequence[VisualMesh]:

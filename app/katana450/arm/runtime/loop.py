@@ -233,6 +233,5 @@ def _differs(a: State, b: State) -> bool:
         or a.findings != b.findings
         or a.objects is not b.objects
         or a.poured is not b.poured
-        or a.appearance is not b.appearance
         or (a.report and a.report.mode) is not (b.report and b.report.mode)
     )

@@ -57,5 +57,5 @@ def _files(options: argparse.Namespace, robot: Robot) -> Mapping[str, bytes]:
         case "mjcf":
             return mjcf_files(read_robot(options.urdf, None, find_arm))
     objects = initial_objects(robot) if options.objects else ()
-    world = world_of(robot, values, objects, plain=options.plain)
+    world = world_of(robot, values, objects)
     return (vrml_files if options.format == "vrml" else x3d_files)(robot, world)

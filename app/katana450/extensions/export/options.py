@@ -17,7 +17,7 @@ class ExportFormat(NamedTuple):
     Attributes:
         help: description for the help of the command.
         posed: whether it is written at a pose.
-        scene: whether it has the objects of a new server, and a Switch for each shape.
+        scene: whether it has the objects of a new server.
         moves: whether it is a page, a single file that plays a motion.
     """
 
@@ -67,11 +67,6 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         help="directory for the files, or the path of the html file",
     )
     parser.add_argument(
-        "--plain",
-        action="store_true",
-        help="vrml and x3d: shapes without a Switch, for three.js and other programs that skip it",
-    )
-    parser.add_argument(
         "--no-objects",
         dest="objects",
         action="store_false",
@@ -113,9 +108,9 @@ def add_shown_options(
 def export_format(options: argparse.Namespace) -> int:
     """Execute ``katana450 export``; return the exit status."""
     row = FORMATS[options.format]
-    if not row.scene and (options.plain or not options.objects):
+    if not row.scene and not options.objects:
         names = " or ".join(named(lambda listed: listed.scene))
-        raise InputError(f"{options.format} has no Switch and no objects. Use {names}.")
+        raise InputError(f"{options.format} has no objects. Use --no-objects with {names}.")
     if not row.moves and (options.trajectory is not None or options.run is not None):
         raise InputError(f"{options.format} has no motion. Use --trajectory or --run with html.")
     if options.pose and not row.posed:

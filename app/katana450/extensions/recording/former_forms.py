@@ -11,10 +11,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from katana450.arm.control.commands.act import tag_of
+from katana450.arm.control.commands.commands import Batch
 from katana450.arm.control.commands.object_commands import Attach
 from katana450.arm.control.objects.pouring import CUP
 from katana450.arm.control.state.modes import Following, Positioning, Target
 from katana450.arm.control.state.scene_objects import Attachment
+from katana450.arm.control.state.state import State
 from katana450.extensions.recording.forms import FormError, shown
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.flow import MotionWithWater, VesselWater
@@ -45,12 +47,12 @@ def command_form(form: Mapping[str, Any], detours: list[Any]) -> Mapping[str, An
     """Return ``form`` of a command as it is written now.
 
     Older versions offered a detour after a drag, which a command of its own took. ``detours`` has
-    the forms of the plans that were offered so far, the newest last.
+    the forms of the plans that were offered so far, the newest last. They also painted links.
     """
     former = form.get("is")
     match form:
-        case {"is": "OfferDetour" | "offer_detour", "plan": plan}:
-            detours.append(plan)
+        case {"is": "OfferDetour" | "offer_detour" | "SetAppearance" | "set_appearance"}:
+            detours += filter(None, [form.get("plan")])
             return {"is": "batch", "commands": []}
         case {"is": "Go" | "go"} if detours:
             return {"is": "follow", "plan": detours[-1], "tau": 0.0}
@@ -112,6 +114,10 @@ def upgraded(kind: type, form: Mapping[str, Any], detours: list[Any]) -> Mapping
     if kind is Positioning:
         detours += filter(None, [form.get("detour")])
         return {name: content for name, content in form.items() if name != "detour"}
+    if kind is State and "appearance" in form:
+        return {name: content for name, content in form.items() if name != "appearance"}
+    if kind is Batch and isinstance(form.get("commands"), list):
+        return dict(form) | {"commands": _without_paint(form["commands"])}
     if kind is VesselWater and "film" in form:
         return _without_film(form)
     if kind is not MotionWithWater:
@@ -126,6 +132,12 @@ def upgraded(kind: type, form: Mapping[str, Any], detours: list[Any]) -> Mapping
     cup = {now: water.pop(name) for name, now in zip(WRITTEN, OF_CUP, strict=True) if name in water}
     motion = {name: whole.pop(name) for name in OF_MOTION if name in whole}
     return whole | {"water": water | {"vessels": [{"name": CUP} | cup]}, "motions": [motion]}
+
+
+def _without_paint(commands: list[Any]) -> list[Any]:
+    """Return the forms of ``commands`` but for those that painted or hid a link or an object."""
+    tags = ("SetAppearance", "set_appearance")
+    return [form for form in commands if not (isinstance(form, dict) and form.get("is") in tags)]
 
 
 def _without_film(form: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -45,6 +46,8 @@ take less room than others beside numbers."""
 
 APART = ("t", "mode", "objects", "bodies")
 PLAIN = tuple(field.name for field in fields(State) if field.name not in APART)
+AS_MADE: Mapping[str, tuple[()]] = {"changed": ()}
+"""The appearance of the links, which older versions could paint and hide."""
 
 
 def _hook(value: Any) -> Any:
@@ -80,6 +83,7 @@ class Digester:
             self._objects = state.objects
             self._of_objects = hashlib.blake2b(self._encoder.encode(state.objects)).digest()
         values = [getattr(state, name) for name in PLAIN]
+        values.insert(PLAIN.index("report"), AS_MADE)
         content = values, self._of_objects, _mode(state.mode)
         # Older versions have none.
         bodies = () if state.bodies is None else (state.bodies,)

@@ -32,7 +32,7 @@ MAX_PRESS_LENGTH = 64
 """Maximum length of the text that identifies one press of STOP."""
 
 Press = Annotated[str, Meta(min_length=1, max_length=MAX_PRESS_LENGTH)] | None
-FieldValue = float | Annotated[list[float], Meta(min_length=1, max_length=4)] | None
+FieldValue = Annotated[list[float], Meta(min_length=1, max_length=4)]
 NodeName = Annotated[str, Meta(min_length=1, max_length=100)]
 Key = Annotated[str, Meta(pattern="^[0-9a-f]{1,64}$")]
 

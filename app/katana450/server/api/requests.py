@@ -277,7 +277,7 @@ class FieldSetting(FieldName, frozen=True, kw_only=True):
     Attributes:
         node: DEF name of the node.
         field: Name of the field.
-        value: New value; null restores the original one.
+        value: New value.
     """
 
     value: FieldValue
@@ -293,7 +293,7 @@ class Set(MotionRequest, frozen=True, kw_only=True):
     Attributes:
         node: DEF name of the node.
         field: Name of the field.
-        value: New value. Null restores the original colour, transparency or choice.
+        value: New value.
         more: Further fields to set at the same time.
     """
 

@@ -137,37 +137,28 @@ class FrameTree:
 
 
 class ArmNodes(FrameTree):
-    """A robot itself, drawn with the normals and the materials of its files.
-
-    Attributes:
-        shapes: nodes of each link's shapes in their original look, by link name.
-        links: the links by name.
-    """
+    """A robot itself, drawn with the normals and the materials of its files."""
 
     def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
         super().__init__(server, "/arm", robot)
-        self.shapes = {
-            link.name: [
-                _as_made(server, f"{self.path[link.name]}/shape{number}", link, number)
-                for number, visual in enumerate(link.visuals)
-                if visual.glb is not None or link.shapes_by_visual[number]
-            ]
-            for link in robot.links
-        }
-        self.links = {link.name: link for link in robot.links}
+        for link in robot.links:
+            for number, visual in enumerate(link.visuals):
+                if visual.glb is not None or link.shapes_by_visual[number]:
+                    _draw(server, f"{self.path[link.name]}/shape{number}", link, number)
 
 
-def _as_made(server: Window, name: str, link: Link, number: int) -> viser.GlbHandle:
+def _draw(server: Window, name: str, link: Link, number: int) -> None:
     """Draw the visual of this ``number`` of ``link`` as the node ``name``."""
     visual = link.visuals[number]
     if visual.glb is None:
-        return server.scene.add_glb(name, glb(link.shapes_by_visual[number]))
-    return server.scene.add_glb(
-        name,
-        visual.glb.read_bytes(),
-        wxyz=so3.to_quaternion(visual.T_body_visual[:3, :3]),
-        position=visual.T_body_visual[:3, 3],
-    )
+        server.scene.add_glb(name, glb(link.shapes_by_visual[number]))
+    else:
+        server.scene.add_glb(
+            name,
+            visual.glb.read_bytes(),
+            wxyz=so3.to_quaternion(visual.T_body_visual[:3, :3]),
+            position=visual.T_body_visual[:3, 3],
+        )
 
 
 def glb(shapes: Sequence[VisualMesh]) -> bytes:

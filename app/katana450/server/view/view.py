@@ -25,7 +25,6 @@ from katana450.server.view.cameras import Cameras, initial_camera, scale_of
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import AddFolders, ViewLayer
-from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel import READOUT_INTERVAL, Panel
 from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
@@ -197,7 +196,6 @@ class View(ViewUpdater):
         self._last_ticket = last_ticket
         props = load_props()
         self._scenery = Scenery(server, robot, session, props, gestures, meshes, layers)
-        self._paint = PaintNodes(server, self._scenery.arm)
         self._ghosts: dict[str, GhostNodes] = {}
         self._tool: ToolNodes | None = None
         if robot.arm is not None:
@@ -232,7 +230,6 @@ class View(ViewUpdater):
         state = snapshot.state
         with self._server.atomic():
             self._scenery.show(state)
-            self._paint.follow(state)
             self._show_goal(state)
             self._cameras.follow(state)
         self._server.flush()

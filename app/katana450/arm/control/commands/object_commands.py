@@ -1,4 +1,4 @@
-"""The commands about scene objects, their water and their appearance; no joint moves."""
+"""The commands about scene objects and their water; no joint moves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from msgspec.structs import force_setattr
 
 from katana450.arm.control.commands.act import Command, Name, Request, Traits
 from katana450.arm.control.commands.checked import Transform, check_finite, vector
-from katana450.arm.control.state.appearance import AS_MADE, MAX_NAME_LENGTH, AppearanceTrait
 from katana450.arm.control.state.scene_objects import (
     MAX_COORDINATE,
     MAX_OBJECTS,
@@ -26,7 +25,7 @@ from katana450.maths.water.units import ML
 SCENE_TRAITS = Traits(
     while_stopped=True, supersedes=False, passive=True, joints_only=True, extension=True
 )
-"""Traits of the commands about objects, water and appearance."""
+"""Traits of the commands about objects and water."""
 
 MOVING_TRAITS = replace(SCENE_TRAITS, gesture=True)
 """Traits of those that move an object as a hand does."""
@@ -102,26 +101,6 @@ class MoveObject(Command, frozen=True, eq=False):
         if self.R is not None:
             R = so3.validated(self.R, f"The rotation of {self.name!r}")
             force_setattr(self, "R", frozen(R))
-
-
-class SetAppearance(Command, frozen=True):
-    """Change one trait of the appearance of the link or object ``name``.
-
-    See ``LinkAppearance.having``.
-    """
-
-    traits: ClassVar[Traits] = SCENE_TRAITS
-
-    name: str
-    trait: AppearanceTrait
-    value: float | tuple[float, ...] | None
-
-    def __post_init__(self) -> None:
-        if not (isinstance(self.name, str) and 0 < len(self.name) <= MAX_NAME_LENGTH):
-            raise InputError(
-                f"A part's name must have 1 to {MAX_NAME_LENGTH} characters, not {self.name!r}."
-            )
-        AS_MADE.having(self.trait, self.value)
 
 
 class Attach(Command, Request, frozen=True, eq=False):

@@ -1,4 +1,4 @@
-"""Transforms of a state by the commands about objects: their places, water and appearance."""
+"""Transforms of a state by the commands about objects: their places and water."""
 
 from __future__ import annotations
 
@@ -7,19 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.commands.object_commands import MoveObject, SetAppearance
+from katana450.arm.control.commands.object_commands import MoveObject
 from katana450.arm.control.objects.environment import Environment
 from katana450.arm.control.objects.pouring import Pouring
-from katana450.arm.control.state import solid
-from katana450.arm.control.state.appearance import DisplayMode, LinkAppearance
-from katana450.arm.control.state.scene_objects import SceneObject, named, placed, with_replaced
+from katana450.arm.control.state.scene_objects import SceneObject, placed, with_replaced
 from katana450.arm.control.state.state import State
 
 
 def with_scene_change(
     environment: Environment, pouring: Pouring | None, state: State, command: cmd.Command
 ) -> State:
-    """Return ``state`` after a command about objects, the water, or the appearance."""
+    """Return ``state`` after a command about objects or the water."""
     x = state.x_setpoint
     match command:
         case cmd.PlaceObject(scene_object=scene_object):
@@ -28,8 +26,6 @@ def with_scene_change(
             return removed(state, name)
         case cmd.MoveObject():
             return with_moved_object(state, command)
-        case cmd.SetAppearance():
-            return with_appearance(state, command)
         case cmd.Attach(name=name, to=to):
             mounted = tuple(
                 environment.mounted(other, to, x) if other.name == name else other
@@ -76,58 +72,3 @@ def with_moved_object(state: State, command: MoveObject) -> State:
         return replace(scene_object, T=T)
 
     return replace(state, objects=tuple(map(moved, state.objects)))
-
-
-def appearance_of(state: State, name: str) -> LinkAppearance:
-    """Return the appearance of the link or object of that name."""
-    scene_object = named(state.objects, name)
-    return state.appearance.of(name) if scene_object is None else _as_link(scene_object.appearance)
-
-
-def with_appearance(state: State, command: SetAppearance) -> State:
-    """Return ``state`` with one trait of an appearance changed.
-
-    The appearance of an object is part of the object; that of a link is part of the state.
-    """
-
-    def changed(scene_object: SceneObject) -> SceneObject:
-        if scene_object.name != command.name:
-            return scene_object
-        appearance = _as_link(scene_object.appearance).having(command.trait, command.value)
-        return replace(scene_object, appearance=_as_object(appearance))
-
-    if any(other.name == command.name for other in state.objects):
-        return replace(state, objects=tuple(map(changed, state.objects)))
-    appearance = state.appearance.having(command.name, command.trait, command.value)
-    return replace(state, appearance=appearance)
-
-
-PAINT = (204, 204, 204)
-"""Default colour of a painted object, red, green, blue of 255."""
-
-
-def _as_link(appearance: solid.ObjectAppearance) -> LinkAppearance:
-    """Return the appearance of an object in the form of a link's."""
-    painted = appearance.colour is not None or appearance.opacity < 1.0
-    choice = DisplayMode.PAINTED if painted else DisplayMode.MADE
-    if appearance.hidden:
-        choice = DisplayMode.HIDDEN
-    if appearance.colour is None:
-        return LinkAppearance(choice, None, 1.0 - appearance.opacity)
-    red, green, blue = (part / 255.0 for part in appearance.colour)
-    return LinkAppearance(choice, (red, green, blue), 1.0 - appearance.opacity)
-
-
-def _as_object(appearance: LinkAppearance) -> solid.ObjectAppearance:
-    """Return the appearance of a link in the form of an object's.
-
-    An object that is shown as it is made keeps no paint.
-    """
-    if appearance.choice is DisplayMode.MADE:
-        return solid.PLAIN
-    colour = None if appearance.choice is DisplayMode.HIDDEN else PAINT
-    if appearance.colour is not None:
-        red, green, blue = (round(255.0 * part) for part in appearance.colour)
-        colour = red, green, blue
-    opacity = max(1.0 - appearance.transparency, solid.MIN_OPACITY)
-    return solid.ObjectAppearance(colour, opacity, appearance.choice is DisplayMode.HIDDEN)

@@ -153,5 +153,4 @@ def restarted(first_state: State, last_state: State | None) -> State:
         grip=last_state.grip,
         squeeze=last_state.squeeze,
         poured=last_state.poured,
-        appearance=last_state.appearance,
     )

@@ -95,7 +95,6 @@ TABLE: Mapping[type[cmd.Command], Row] = {
     cmd.ReplaceScene: _row(None,       A,   A,   A,   A,   A,   A),
     cmd.Remove: _row(None,             A,   A,   A,   A,   A,   A),
     cmd.Fill: _row(None,               A,   A,   A,   A,   A,   A),
-    cmd.SetAppearance: _row(None,      A,   A,   A,   A,   A,   A),
     # The driver performs the act; the session has stopped.
     cmd.OperateArm: _row(None,         A,   A,   A,   A,   A,   A),
     # Each of its commands has the effect of its own row.

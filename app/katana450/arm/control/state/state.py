@@ -8,7 +8,6 @@ from enum import Enum
 
 import numpy as np
 
-from katana450.arm.control.state.appearance import ALL_AS_MADE, Appearance
 from katana450.arm.control.state.arm_report import ArmMode, ArmReport
 from katana450.arm.control.state.modes import (
     IDLE,
@@ -231,7 +230,6 @@ class State:
         poured: the water of the cup; None if there is none.
         bodies: the motion of the loose objects, with the forces of the fingers; None while all of
             them are at rest and the fingers touch none.
-        appearance: how links and objects are drawn.
         report: the report of the driver; None for an arm that follows its setpoints exactly.
         astray_since: time since which the tracking error is too large [s]; None if it is not.
         outcomes: the outcomes of the commands of this tick, one for each.
@@ -259,7 +257,6 @@ class State:
     squeeze: float = 0.0
     poured: MotionWithWater | None = None
     bodies: BodyMotion | None = None
-    appearance: Appearance = ALL_AS_MADE
     report: ArmReport | None = None
     astray_since: float | None = None
     outcomes: tuple[Outcome, ...] = ()

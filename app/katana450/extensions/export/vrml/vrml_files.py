@@ -4,16 +4,13 @@ Each joint is a Transform whose `rotation` is about its axis in the root's frame
 bring a point of the axis to the origin and back: VTK ignores `center`. The nested Transforms are
 therefore the product of exponentials, link by link. Each link is a Transform with its pose while
 all joints are at zero, so that a program that computes absolute poses finds the frame of the link.
-
-The shapes of a link are in a Switch: 0 shows them as made, 1 painted in one colour, -1 hides them.
-A plain world has the shapes alone, for programs that skip a Switch.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,13 +24,13 @@ from katana450.arm.robot.initial_camera import (
 from katana450.arm.robot.link import Link
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import Material, VisualMesh, main_colour, shapes_of
+from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual
 from katana450.assembly.robot_session import arm_session
 from katana450.errors import InputError
 from katana450.extensions.export.files import distinct
 from katana450.extensions.export.obj_text import DIGITS, NORMAL_DIGITS
-from katana450.extensions.export.vrml.vrml_names import NodeNames, VrmlNames
+from katana450.extensions.export.vrml.vrml_names import VrmlNames
 from katana450.extensions.export.vrml.vrml_world import (
     Node,
     Use,
@@ -62,11 +59,6 @@ class PlacedObject:
     T: FloatArray
     shapes: Sequence[VisualMesh]
 
-    @property
-    def colour(self) -> tuple[float, float, float]:
-        """The colour (sRGB, 0..1) of its largest part."""
-        return main_colour(self.shapes)
-
 
 def initial_objects(robot: Robot) -> tuple[PlacedObject, ...]:
     """Return the objects that a new server has around ``robot``; none without an arm."""
@@ -93,9 +85,6 @@ def view(robot: Robot, values: Mapping[str, float]) -> InitialCamera:
     return fitted(np.concatenate(points), np.array(VIEW_DIRECTION))
 
 
-SURFACE = "_surface"
-"""Put, with a number, behind the name of a link or object for its face sets."""
-
 SKY = (0.87, 0.89, 0.92)
 """Colour of the background."""
 
@@ -111,39 +100,25 @@ class _Writing:
     Attributes:
         robot: the robot.
         names: its names in the world.
-        objects: names of the Transform and the appearance of each object, by its own name.
-        plain: whether the world has no Switch.
-        surface: suffix, before a number, of the name of a link or object for its face sets.
+        objects: name of the Transform of each object, by its own name.
         materials: the materials that have a node already.
     """
 
-    def __init__(self, robot: Robot, objects: Sequence[PlacedObject], *, plain: bool) -> None:
+    def __init__(self, robot: Robot, objects: Sequence[PlacedObject]) -> None:
         self.robot = robot
         self.names = VrmlNames(robot)
         self.objects = self.names.objects([placed_object.name for placed_object in objects])
-        self.plain = plain
-        placed = [name for name, _ in self.objects.values()]
-        self.surface = self.names.unused_suffix(SURFACE, placed)
         self.materials: set[Material] = set()
 
 
 def world_of(
-    robot: Robot,
-    values: Mapping[str, float],
-    objects: Sequence[PlacedObject] = (),
-    *,
-    plain: bool = False,
+    robot: Robot, values: Mapping[str, float], objects: Sequence[PlacedObject] = ()
 ) -> World:
-    """Return the whole robot at the joint ``values`` [rad, m].
-
-    ``objects`` stand around the robot. A ``plain`` world has no Switch.
-    """
-    writing = _Writing(robot, objects, plain=plain)
+    """Return the whole robot at the joint ``values`` [rad, m], with ``objects`` around it."""
+    writing = _Writing(robot, objects)
     contents = [_link(writing, robot.links[0], values)]
     for placed in objects:
-        name, dressed = writing.objects[placed.name]
-        shown = _dressed(writing, placed.shapes, placed.colour, name, dressed)
-        contents.append(Node("Transform", (*_pose(placed.T), ("children", shown)), name))
+        contents.append(_shown(writing, placed.T, placed.shapes, writing.objects[placed.name]))
     nodes = [
         *_surroundings(robot, values),
         Node("Transform", (("rotation", Z_UP), ("children", contents))),
@@ -169,7 +144,7 @@ def x3d_files(robot: Robot, world: World) -> dict[str, bytes]:
 
 def part_world(robot: Robot, link: Link) -> World:
     """Return one link at its place with all joints at zero, z up; all of them form the robot."""
-    writing = _Writing(robot, (), plain=True)
+    writing = _Writing(robot, ())
     title = Node("WorldInfo", (("title", f"{robot.name} {link.name}"),))
     placed = _placed(writing, link)
     return World((title, Node("Transform", (("rotation", Z_UP), ("children", [placed])))))
@@ -228,45 +203,18 @@ def _group(children: Sequence[Node]) -> Node:
 
 def _placed(writing: _Writing, link: Link) -> Node:
     """Return the Transform of a link with its shapes, as placed with all joints at zero."""
-    names = writing.names
-    name, dressed = names.links[link.name], names.dressed.get(link.name)
-    shown = [] if dressed is None else _dressed(writing, link.shapes, link.colour, name, dressed)
-    pose = _pose(writing.robot.home[link.name])
-    return Node("Transform", (*pose, ("children", shown)), name)
+    T = writing.robot.home[link.name]
+    return _shown(writing, T, link.shapes, writing.names.links[link.name])
 
 
-def _pose(T: FloatArray) -> tuple[tuple[str, Value], ...]:
-    """Return the fields of a Transform with the pose ``T`` (4, 4)."""
-    return ("translation", _rounded(T[:3, 3], 9)), ("rotation", _rounded(axis_angle(T[:3, :3]), 9))
-
-
-def _dressed(
-    writing: _Writing,
-    shapes: Sequence[VisualMesh],
-    colour: Sequence[float],
-    name: str,
-    dressed: NodeNames,
-) -> list[Node]:
-    """Return the Switch of a link or object: its shapes as made, and again to be painted.
-
-    A plain world has the shapes as made alone.
-    """
-    nodes = [_shape(writing, shape) for shape in shapes]
-    if writing.plain:
-        return nodes
-    colours = (("diffuseColor", _rounded(colour, 4)), ("transparency", 0.0))
-    paint: Node | Use = Node("Material", colours, dressed.paint)
-    painted: list[Node] = []
-    for number, shape in enumerate(nodes):
-        surface_name = f"{name}{writing.surface}{number}"
-        look, (field, surface) = shape.fields
-        assert isinstance(surface, Node)
-        nodes[number] = replace(shape, fields=(look, (field, replace(surface, name=surface_name))))
-        one = Node("Appearance", (("material", paint),))
-        painted.append(Node("Shape", (("appearance", one), (field, Use(surface_name)))))
-        paint = Use(dressed.paint)
-    choices: list[Node] = [_group(nodes), _group(painted)]
-    return [Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.appearance)]
+def _shown(writing: _Writing, T: FloatArray, shapes: Sequence[VisualMesh], name: str) -> Node:
+    """Return the Transform ``name`` with ``shapes`` at the pose ``T`` (4, 4)."""
+    fields: tuple[tuple[str, Value], ...] = (
+        ("translation", _rounded(T[:3, 3], 9)),
+        ("rotation", _rounded(axis_angle(T[:3, :3]), 9)),
+        ("children", [_shape(writing, shape) for shape in shapes]),
+    )
+    return Node("Transform", fields, name)
 
 
 def _shape(writing: _Writing, shape: VisualMesh) -> Node:

@@ -2,7 +2,7 @@
 
 Setting a joint's rotation, or the pose of the tool, makes it the target of a motion; it never sets
 the position itself.
-Settings of objects and paints become commands as well. The names are those of the exported files.
+Settings of objects become commands as well. The names are those of the exported files.
 """
 
 from __future__ import annotations
@@ -18,15 +18,13 @@ import numpy as np
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.environment import Environment
 from katana450.arm.control.objects.loose_objects import check_carried, is_loose
-from katana450.arm.control.objects.scene_changes import appearance_of, with_moved_object
-from katana450.arm.control.state.appearance import AppearanceTrait, Colour
+from katana450.arm.control.objects.scene_changes import with_moved_object
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.link import Joint
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
-from katana450.extensions.export.vrml.vrml_names import NodeNames, VrmlNames
+from katana450.extensions.export.vrml.vrml_names import VrmlNames
 from katana450.extensions.export.vrml.vrml_world import axis_angle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -37,18 +35,15 @@ from katana450.server.service.arm_handle import Nodes
 class Type(Enum):
     """The VRML type of a field."""
 
-    INT = "SFInt32"
-    FLOAT = "SFFloat"
     VECTOR = "SFVec3f"
-    COLOR = "SFColor"
     ROTATION = "SFRotation"
 
 
-WIDTHS = {Type.INT: 1, Type.FLOAT: 1, Type.VECTOR: 3, Type.COLOR: 3, Type.ROTATION: 4}
+WIDTHS = {Type.VECTOR: 3, Type.ROTATION: 4}
 """Count of numbers in a value of each type that can be set."""
 
-FieldValue = float | list[float]
-"""The value of a field: one number or several."""
+Put = Callable[["FieldOrders", list[float]], None]
+"""A function that sets a field."""
 
 
 class FieldOrders:
@@ -83,8 +78,8 @@ class NamedField:
     """
 
     type: Type
-    read: Callable[[State], FieldValue]
-    put: Callable[[FieldOrders, FieldValue | None], None] | None = None
+    read: Callable[[State], list[float]]
+    put: Put | None = None
     why: str = ""
 
 
@@ -162,9 +157,7 @@ class VrmlNodes(Nodes):
             field = self._field(state, setting.node, setting.field)
             if field.put is None:
                 raise InputError(field.why or f"{name} can be read but not set.")
-            field.put(
-                orders, None if setting.value is None else _fitting(name, field, setting.value)
-            )
+            field.put(orders, _fitting(name, field, setting.value))
         self._check_carried(orders)
         commands = (*self._motion(orders), *orders.others)
         return commands[0] if len(commands) == 1 else cmd.Batch(commands)
@@ -211,9 +204,8 @@ class VrmlNodes(Nodes):
         names = tuple(scene_object.name for scene_object in state.objects)
         if names != self._known[0]:
             nodes = dict(self._fixed)
-            for name, (put, dressed) in self._names.objects(names).items():
-                nodes[put] = self._object(name)
-                nodes |= _dress(name, f"object {name}", dressed, PLAIN)
+            for name, node in self._names.objects(names).items():
+                nodes[node] = self._object(name)
             self._known = (names, nodes)
         return self._known[1]
 
@@ -223,22 +215,18 @@ class VrmlNodes(Nodes):
             nodes[self._names.links[link.name]] = self._link(link.name)
             if link.joint is not None:
                 nodes[self._names.joints[link.joint.name]] = self._joint(link.joint)
-            if link.shapes:
-                dressed = self._names.dressed[link.name]
-                nodes |= _dress(link.name, f"link {link.name}", dressed, link.colour)
         return nodes
 
     def _joint(self, joint: Joint) -> NamedNode:
         axis = self._robot.axis(joint)
         name = joint.name
 
-        def read(state: State) -> FieldValue:
+        def read(state: State) -> list[float]:
             value = self._values(state)[name]
             return [*(value * axis).tolist()] if joint.slides else [*axis.tolist(), value]
 
-        def put(orders: FieldOrders, value: FieldValue | None) -> None:
-            numbers = _given(name, value)
-            amount = _along(name, axis, numbers) if joint.slides else _about(name, axis, numbers)
+        def put(orders: FieldOrders, value: list[float]) -> None:
+            amount = _along(name, axis, value) if joint.slides else _about(name, axis, value)
             if name in self._axes:
                 orders.axes[self._axes[name] + 1] = amount
             else:
@@ -265,13 +253,13 @@ class VrmlNodes(Nodes):
             if link != orders.state.tool:
                 raise InputError(f"{other}{orders.state.tool}.")
 
-        def move(orders: FieldOrders, value: FieldValue | None) -> None:
+        def move(orders: FieldOrders, value: list[float]) -> None:
             check_tool(orders)
-            orders.position = np.array(_given(link, value))
+            orders.position = np.array(value)
 
-        def turn(orders: FieldOrders, value: FieldValue | None) -> None:
+        def turn(orders: FieldOrders, value: list[float]) -> None:
             check_tool(orders)
-            orders.R = _rotation(link, _given(link, value))
+            orders.R = _rotation(link, value)
 
         is_tool = arm is not None and link in arm.tools
         why = other + ("a joint." if arm is None else f"{' or '.join(arm.tools)}.")
@@ -285,19 +273,15 @@ class VrmlNodes(Nodes):
         def pose(state: State) -> FloatArray:
             return self._surroundings.pose(_known_object(state, name), state.x)
 
-        def move(orders: FieldOrders, value: FieldValue | None) -> None:
-            position = np.array(_out_of_the_hand(orders, name, value))
-            orders.others.append(cmd.MoveObject(name, position=position))
+        def move(orders: FieldOrders, value: list[float]) -> None:
+            _check_out_of_the_hand(orders, name)
+            orders.others.append(cmd.MoveObject(name, position=np.array(value)))
 
-        def turn(orders: FieldOrders, value: FieldValue | None) -> None:
-            R = _rotation(name, _out_of_the_hand(orders, name, value))
-            orders.others.append(cmd.MoveObject(name, R=R))
+        def turn(orders: FieldOrders, value: list[float]) -> None:
+            _check_out_of_the_hand(orders, name)
+            orders.others.append(cmd.MoveObject(name, R=_rotation(name, value)))
 
         return _placed(f"object {name}", pose, move, turn)
-
-
-Put = Callable[[FieldOrders, FieldValue | None], None]
-"""A function that sets a field."""
 
 
 def _placed(owner: str, pose: Callable[[State], FloatArray], move: Put, turn: Put) -> NamedNode:
@@ -316,69 +300,20 @@ def _placed(owner: str, pose: Callable[[State], FloatArray], move: Put, turn: Pu
     )
 
 
-def _dress(name: str, owner: str, dressed: NodeNames, colour: Colour) -> dict[str, NamedNode]:
-    """Return the Switch of a link or object, and the Material of its paint."""
-
-    def put(trait: AppearanceTrait) -> Put:
-        def changed(orders: FieldOrders, value: FieldValue | None) -> None:
-            trait_value = tuple(value) if isinstance(value, list) else value
-            orders.others.append(cmd.SetAppearance(name, trait, trait_value))
-
-        return changed
-
-    return {
-        dressed.appearance: NamedNode(
-            "Switch",
-            owner,
-            {
-                "whichChoice": NamedField(
-                    Type.INT,
-                    lambda state: float(appearance_of(state, name).choice.value),
-                    put(AppearanceTrait.CHOICE),
-                )
-            },
-        ),
-        dressed.paint: NamedNode(
-            "Material",
-            owner,
-            {
-                "diffuseColor": NamedField(
-                    Type.COLOR,
-                    lambda state: list(appearance_of(state, name).colour or colour),
-                    put(AppearanceTrait.COLOUR),
-                ),
-                "transparency": NamedField(
-                    Type.FLOAT,
-                    lambda state: appearance_of(state, name).transparency,
-                    put(AppearanceTrait.TRANSPARENCY),
-                ),
-            },
-        ),
-    }
-
-
-def _fitting(name: str, field: NamedField, value: FieldValue) -> FieldValue:
+def _fitting(name: str, field: NamedField, value: list[float]) -> list[float]:
     """Return ``value`` if it fits the type of the field. Raises InputError."""
-    numbers = value if isinstance(value, list) else [value]
-    if len(numbers) != WIDTHS[field.type] or isinstance(value, list) != (len(numbers) > 1):
-        expected = "a number" if WIDTHS[field.type] == 1 else f"{WIDTHS[field.type]} numbers"
-        raise InputError(f"{name} is a {field.type.value}, which is {expected}, not {value}.")
-    if not all(map(math.isfinite, numbers)):
+    width = WIDTHS[field.type]
+    if len(value) != width:
+        raise InputError(f"{name} is a {field.type.value}, which is {width} numbers, not {value}.")
+    if not all(map(math.isfinite, value)):
         raise InputError(f"{name} must be finite, not {value}.")
     return value
 
 
-def _out_of_the_hand(orders: FieldOrders, name: str, value: FieldValue | None) -> list[float]:
-    """Return ``value`` if the object can be moved. Raises InputError."""
+def _check_out_of_the_hand(orders: FieldOrders, name: str) -> None:
+    """Raise InputError if the object is held."""
     if _known_object(orders.state, name).held:
         raise InputError(f"{name!r} is held. Open the gripper first.")
-    return _given(name, value)
-
-
-def _given(name: str, value: FieldValue | None) -> list[float]:
-    if not isinstance(value, list):
-        raise InputError(f"{name} has no default. Give a value.")
-    return value
 
 
 def _about(name: str, axis: FloatArray, rotation: list[float]) -> float:

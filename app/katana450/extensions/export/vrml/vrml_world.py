@@ -96,7 +96,7 @@ X3D_HEADER = (
     'xsd:noNamespaceSchemaLocation="https://www.web3d.org/specifications/x3d-3.3.xsd">\n'
     "<Scene>\n"
 )
-"""Beginning of an X3D file: the profile that has Switch, sensors and interpolators."""
+"""Beginning of an X3D file: the profile is Immersive."""
 
 NUMBERS_A_LINE = 48
 """Numbers per line: few enough for old readers, enough for small files."""
