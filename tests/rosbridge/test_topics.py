@@ -47,6 +47,7 @@ async def test_topics_describe_the_arm_as_it_is(client: RosClient, robot: Robot)
         for topic in ("/tf", "/tf_static")
         for transform in latest[topic]["transforms"]
     }
+    assert edges["objects/cup"][0] == robot.links[0].name
     T, frame = np.eye(4), at_home["tool"]
     while frame != robot.links[0].name:
         frame, step = edges[frame]

@@ -28,6 +28,10 @@ PERIODS: Mapping[str, float] = {
 """[s] Interval of each topic. A topic without one is sent once, to each new subscriber."""
 
 
+OBJECTS = "objects/"
+"""Begin of the name of the frame of an object of the scene."""
+
+
 class Publications(NamedTuple):
     """The topics of one server. ``description``: the text of /robot_description."""
 
@@ -81,22 +85,28 @@ def axis_names(robot: Robot) -> tuple[str, ...]:
 
 
 def transforms(arm: ArmHandle, stamp: Time, *, moving: bool) -> Fields:
-    """Return the poses of the links that joints move, or else of the fixed ones, in their parents.
+    """Return the poses of what moves, or else of the fixed links, in their parents.
 
-    Translations are in m, rotations unit quaternions.
+    Links that joints move are in their parents, objects of the scene in the root. Translations are
+    in m, rotations unit quaternions.
     """
-    values = arm.robot.joint_values(arm.state.q, arm.state.gripper)
+    values, links = arm.robot.joint_values(arm.state.q, arm.state.gripper), arm.robot.links
+    placed = [
+        (link.parent, link.name, link.at_rest(values))
+        for link in links
+        if link.parent is not None and (link.joint is not None) is moving
+    ]
+    for scene_object in arm.state.objects if moving else ():
+        T = arm.environment.pose(scene_object, arm.state.x)
+        placed.append((links[0].name, f"{OBJECTS}{scene_object.name}", T))
     poses: list[Fields] = []
-    for link in arm.robot.links:
-        if link.parent is None or (link.joint is not None) is not moving:
-            continue
-        T = link.at_rest(values)
+    for parent, child, T in placed:
         translation = dict(zip("xyz", T[:3, 3].tolist(), strict=True))
         rotation = dict(zip("wxyz", so3.to_quaternion(T[:3, :3]).tolist(), strict=True))
         poses.append(
             {
-                "header": Header(stamp=stamp, frame_id=link.parent),
-                "child_frame_id": link.name,
+                "header": Header(stamp=stamp, frame_id=parent),
+                "child_frame_id": child,
                 "transform": {"translation": translation, "rotation": rotation},
             }
         )
