@@ -27,7 +27,6 @@ from katana450.cli.main import main as katana450
 from katana450.extensions.media.stage import RenderStage, Shot
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import RecordedStates
-from katana450.server.viser_bridge.presets import Preset
 from tests.recording.dataset_files import BEGIN, episode_folder
 from tests.recording.lerobot_check import check_dataset, episodes_of, rows_of
 from tests.recording.recorded import described, swinging
@@ -60,7 +59,7 @@ def expected_pictures(folder: Path, dataset: Path) -> dict[str, npt.NDArray[Any]
             numbers += (row["dataset_from_index"] + frames).tolist()
             for state in RecordedStates(file, session).at(file.start + BEGIN + frames / FPS):
                 for view in VIEWS:
-                    shot = Shot(Preset[view.upper()], SIZE)
+                    shot = Shot(view, SIZE)
                     taken[view].append(shot.taken(stage, robot, state))
     pictures = {
         f"pictures observation.images.{view}": np.array(each) for view, each in taken.items()

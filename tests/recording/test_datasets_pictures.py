@@ -24,7 +24,6 @@ from katana450.extensions.recording.datasets.lerobot_writer import QUANTILES, Pi
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import RecordedStates
 from katana450.extensions.recording.options import VIEWS
-from katana450.server.viser_bridge.presets import Preset
 from tests.media.test_files import HEIGHT, WIDTH, decoded, frames
 from tests.recording.dataset_files import episode_folder
 from tests.recording.lerobot_check import check_dataset, episodes_of
@@ -97,16 +96,16 @@ def test_pictures_show_the_states(tmp_path: Path) -> None:
     assert info["features"]["observation.images.tool"]["shape"] == [48, 64, 3]
     robot, session, _ = described()
     stage = RenderStage(robot, session, load_props())
-    expected: dict[str, list[npt.NDArray[np.uint8]]] = {"FREE": [], "TOOL": []}
+    expected: dict[str, list[npt.NDArray[np.uint8]]] = {"free": [], "tool": []}
     for number, row in enumerate(episodes_of(out), start=1):
         with RecordingFile.open(folder / f"episode-{number:04d}.mcap") as file:
             times = file.start + 0.25 + np.arange(row["length"]) / FPS
             for state in RecordedStates(file, session).at(times):
                 for view, pictures in expected.items():
-                    shot = Shot(Preset[view], SIZE)
+                    shot = Shot(view, SIZE)
                     pictures.append(shot.taken(stage, robot, state))
     for view, pictures in expected.items():
-        feature = f"observation.images.{view.lower()}"
+        feature = f"observation.images.{view}"
         shown, _ = decoded(out / f"videos/{feature}/chunk-000/file-000.mp4", SIZE)
         assert len(shown) == info["total_frames"] == len(pictures)
         for number, picture in enumerate(pictures):

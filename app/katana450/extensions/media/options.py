@@ -8,8 +8,8 @@ from pathlib import Path
 from katana450.cli.option_values import add_arm_options, size
 from katana450.extensions.export.options import add_shown_options
 
-CAMERAS = ("free", "front", "side", "top", "tool")
-"""Camera presets, as on the page; the first is its 3D view."""
+CAMERAS = ("free", "front", "side", "top", "tool", "wrist")
+"""Camera presets, as on the page, and the camera on the hand; the first is its 3D view."""
 
 
 def add_render_options(parser: argparse.ArgumentParser) -> None:
@@ -36,3 +36,4 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         "--fps", type=float, default=25.0, help="pictures per second (default: %(default)g)"
     )
     add_arm_options(parser, tool=False)
+

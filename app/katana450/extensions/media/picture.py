@@ -102,25 +102,27 @@ def _stacked(parts: Sequence[Any], kind: Any) -> npt.NDArray[Any]:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera, which does not look straight up or down.
+    """A pinhole camera, which does not look along its ``up``.
 
     Attributes:
         position: [m] in the base frame, z up.
         target: point that it looks at [m].
         fov: vertical field of view [rad].
         size: width and height of its picture [px].
+        up: direction that is up in the picture, in the base frame.
     """
 
     position: tuple[float, float, float]
     target: tuple[float, float, float]
     fov: float
     size: tuple[int, int]
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     @cached_property
     def frame(self) -> Floats:
         """The rows (3, 3) of its axes in the base frame: right, up and ahead."""
         forward = unit(np.subtract(self.target, self.position))
-        right = unit(np.cross(forward, (0.0, 0.0, 1.0)))
+        right = unit(np.cross(forward, self.up))
         return np.stack((right, np.cross(right, forward), forward)).astype(np.float32)
 
     @property

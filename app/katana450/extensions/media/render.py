@@ -13,7 +13,6 @@ from katana450.extensions.media.film import check_filmable, write_film
 from katana450.extensions.media.picture import check_traceable, png
 from katana450.extensions.media.stage import RenderStage, Shot, rendering_pool
 from katana450.extensions.progress import progress
-from katana450.server.viser_bridge.presets import Preset
 
 
 def render(options: argparse.Namespace) -> int:
@@ -28,7 +27,7 @@ def render(options: argparse.Namespace) -> int:
     check_writable(path)
     if kind == ".mp4":
         check_filmable(options.size, options.fps)
-    shot = Shot(Preset[options.camera.upper()], options.size)
+    shot = Shot(options.camera, options.size)
     shown = chosen(options)
     if kind == ".png":
         stage = RenderStage(shown.robot, shown.session, load_props())

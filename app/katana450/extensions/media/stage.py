@@ -26,8 +26,10 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of, smooth_normals
 from katana450.arm.robot.visual import Visual
 from katana450.assembly.robot_session import find_robot
+from katana450.caching import cached_property
 from katana450.extensions.conduit import ConduitStretch, poses, ring, stretches_of
 from katana450.extensions.media.picture import Camera, Item, Pixels, Translucent, picture
+from katana450.extensions.media.wrist_camera import WRIST, WristCamera
 from katana450.extensions.water import WaterPart, parts_of
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -60,6 +62,11 @@ class RenderStage:
         self._table = _in_file(props.table.mesh)
         self._props = props
         self._stretches = [_BendableStretch(stretch) for stretch in stretches_of(robot)]
+
+    @cached_property
+    def wrist_camera(self) -> WristCamera:
+        """The camera on the hand. Raises InputError without one."""
+        return WristCamera(self._robot, self._session)
 
     def items(self, state: State) -> list[Item]:
         """Return all opaque items."""
@@ -163,15 +170,18 @@ AHEAD = 4
 
 
 class Shot(NamedTuple):
-    """The view and size of a picture."""
+    """The view and size of a picture. The view has the name of a preset, or is "wrist"."""
 
-    preset: Preset
+    view: str
     size: tuple[int, int]
 
     def taken(self, stage: RenderStage, robot: Robot, state: State) -> Pixels:
-        """Return the picture of ``state``."""
-        view = camera_pose(self.preset, robot, state)
-        camera = Camera(view.position, view.target, float(FOV), self.size)
+        """Return the picture of ``state``. Raises InputError for a wrist without a hand."""
+        if self.view == WRIST:
+            camera = stage.wrist_camera.of(state, self.size)
+        else:
+            view = camera_pose(Preset[self.view.upper()], robot, state)
+            camera = Camera(view.position, view.target, float(FOV), self.size)
         return picture(stage.items(state), stage.water(state), camera)
 
 

@@ -20,7 +20,7 @@ FORMATS = {
 OUTCOMES = ("success", "failure", "unjudged", "unfinished")
 """Outcomes of episodes, of which a dataset takes the first two by default."""
 
-VIEWS = ("free", "front", "side", "top", "tool")
+VIEWS = ("free", "front", "side", "top", "tool", "wrist")
 """Cameras, as `katana450 render` has them. Without that extension only pictures are missing."""
 
 DEFAULT_SIZES = {"lerobot": (320, 240), "mp4": (1280, 720)}

@@ -23,7 +23,6 @@ from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import RecordedStates, frame_times
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
-from katana450.sdk import Preset
 
 PAGE_SUFFIXES = (".html", ".htm")
 FILM_SUFFIX = ".mp4"
@@ -44,7 +43,7 @@ class PictureViews:
             bare: whether it has no gripper.
         """
         check_traceable()
-        self._shots = [Shot(Preset[view.upper()], size) for view in views]
+        self._shots = [Shot(view, size) for view in views]
         self._urdf, self._bare = URDF_PATH if urdf is None else urdf, bare
 
     @contextmanager
