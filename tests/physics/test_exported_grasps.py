@@ -201,7 +201,7 @@ class Hand:
             yield arm | {name: factor * goal + offset for name, (factor, offset) in fingers.items()}
 
     def holds(self, grasp: Grasp, states: list[State]) -> bool:
-        """Return whether MuJoCo holds the object when its drives have the goals of ``states``."""
+        """Return whether MuJoCo lifts the object when its drives have the goals of ``states``."""
         model = self._model(grasp)
         data, part = mujoco.MjData(model), model.body("part").id
         for name, value in self.robot.joint_values(states[0].q, states[0].gripper).items():
@@ -219,7 +219,8 @@ class Hand:
             before = after
         bodies = model.geom_bodyid[data.contact.geom]
         touching = set(bodies[(bodies == part).any(axis=1)].ravel().tolist())
-        return len(touching) > 1 and 0 not in touching
+        lifted = data.xpos[part][2] > T[2, 3] + LIFTED
+        return lifted and len(touching) > 1 and 0 not in touching
 
     def _model(self, grasp: Grasp) -> Any:
         """Return the exported model with the object of ``grasp``."""

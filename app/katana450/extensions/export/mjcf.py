@@ -7,6 +7,7 @@ coupled by an equality. The drives of the joints are chosen from the masses that
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -88,12 +89,14 @@ class HandDrive(NamedTuple):
         joints: names of the driven finger joints.
         stiffness, force: stiffness of the drive of each of them, and its greatest force
             [N m/rad or N/m, N m or N].
+        fingers: number of finger joints, with those that follow.
     """
 
     links: frozenset[str]
     joints: tuple[str, ...]
     stiffness: float
     force: float
+    fingers: int
 
 
 def grip_of(robot: Robot) -> HandDrive | None:
@@ -111,7 +114,9 @@ def grip_of(robot: Robot) -> HandDrive | None:
         if part.mover == drive.palm or variable[part.mover] == drive.variable
     )
     joints = tuple(name for name in robot.driven if name in robot.arm.fingers)
-    return HandDrive(links, joints, drive.stiffness / len(joints), drive.force_limit / len(joints))
+    count = len(joints)
+    stiffness, force = drive.stiffness / count, drive.force_limit / count
+    return HandDrive(links, joints, stiffness, force, len(robot.arm.fingers))
 
 
 def is_frame(robot: Robot, link: Link) -> bool:
@@ -142,13 +147,15 @@ def drives_of(robot: Robot, grip: HandDrive | None) -> dict[str, Drive]:
         stiffness = load / SAG
         is_credible = CREDIBLE_RATIO * load <= joint.effort < np.inf
         force = joint.effort if is_credible else FORCE_RATIO * load
-        armature = INERTIA_RATIO * inertia
+        armature, ratio = INERTIA_RATIO * inertia, DAMPING_RATIO
         if grip is not None and joint.leader in grip.joints:
             stiffness, force = max(stiffness, grip.stiffness), grip.force
             # A light finger would be pressed into what it holds.
             armature = physics.FINGER_MASS if joint.slides else physics.FINGER_INERTIA
+            # In the joints, because a drive at its greatest force has no damping of its own.
+            ratio = 1.0 / math.sqrt(grip.fingers)
         armature = max(armature, stiffness / MAX_FREQUENCY**2 - inertia)
-        spring = DAMPING_RATIO * 2.0 * float(np.sqrt(stiffness * (inertia + armature)))
+        spring = ratio * 2.0 * float(np.sqrt(stiffness * (inertia + armature)))
         drives[joint.name] = Drive(
             stiffness, armature, joint.damping or spring, joint.friction, force
         )
@@ -416,6 +423,7 @@ class _Model:
 
     def _add_actuators(self, root: ET.Element) -> None:
         actuators = ET.SubElement(root, "actuator")
+        holding = () if self._grip is None else self._grip.joints
         for name in self._robot.driven:
             joint, drive = self._robot.joints[name], self._drives[name]
             limits = _range(joint)
@@ -426,7 +434,7 @@ class _Model:
                     "name": name,
                     "joint": name,
                     "kp": _numbers([drive.stiffness], 3),
-                    "dampratio": "1",
+                    **({} if name in holding else {"dampratio": "1"}),
                     "forcerange": _numbers((-drive.max_force, drive.max_force), 4),
                     **({"ctrlrange": limits} if limits else {}),
                 },

@@ -36,4 +36,3 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         "--fps", type=float, default=25.0, help="pictures per second (default: %(default)g)"
     )
     add_arm_options(parser, tool=False)
-
