@@ -81,9 +81,6 @@ export class Timeline {
     page.store.follow(follow);
   }
 
-  /** @param {unknown} error */
-  #toast = (error) => this.#page.toast(messageOf(error));
-
   get open() {
     return this.#box.classList.contains("open");
   }
@@ -140,7 +137,7 @@ export class Timeline {
     api.restore({ page: this.#page.name, of: this.#of, t, revocations }).then(() => {
       this.live();
       this.#page.toast(`The arm continues from ${timeInWords(t)}.`);
-    }, this.#toast);
+    }, (error) => this.#page.toast(messageOf(error)));
   }
 
   /** A request of this window, which moves what is seen. @param {Api.Act} request */
