@@ -13,7 +13,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.tool_targets import branch_options
 from katana450.arm.control.state.findings import of_projection
-from katana450.arm.control.state.messages import PRIORITIES, finding_text
+from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.modes import JointTarget
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.maths.geometry import se3, so3
@@ -174,29 +174,6 @@ def test_each_priority_keeps_its_part_and_reports_what_is_lost(
         )
         (gap,) = (f.amount for f in state.findings if f.reason is Reason.POSITION_CHANGED)
         assert gap == pytest.approx(math.dist(point(arm, state.goal), FAR_OUT), abs=1e-12)
-
-
-@pytest.mark.parametrize("priority", PRIORITIES)
-def test_each_priority_loses_its_own_part_in_a_drag_out_of_reach(
-    arm: ArmModel, session: Session, state: State, priority: Priority
-) -> None:
-    state = take(session, state, cmd.SetPriority(priority))
-    pitch, _ = pitch_and_roll(session.require_arm().chain, state.goal)
-    target = point(arm, state.goal)
-    for _ in range(20):
-        target = target + 0.006 * OUT
-        state = take(session, state, cmd.Position(target))
-    # 0.6 m out and level with the shoulder, the arm is nearly stretched.
-    tilted = abs(pitch_and_roll(session.require_arm().chain, state.goal)[0] - pitch)
-    short = math.dist(point(arm, state.goal), target)
-    if priority is Priority.PITCH:
-        assert tilted < 1e-9
-        assert short > 1e-3
-        assert Reason.POSITION_CHANGED in reasons(state)
-    else:
-        assert tilted > 0.1
-        assert short < 1e-9
-        assert Reason.PITCH_CHANGED in reasons(state)
 
 
 def test_lost_pitch_is_reported_also_out_of_reach(session: Session) -> None:

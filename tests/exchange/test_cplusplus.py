@@ -32,11 +32,3 @@ def test_cplusplus_calls_the_functions_of_c(tmp_path: Path, katana: Robot) -> No
     objects = ("frames.o", "arm_kinematics.o")
     run("g++", "-std=c++98", *STRICT, "main.cpp", *objects, "-lm", folder=tmp_path)
     assert run(tmp_path / "a.out").startswith("tool at ")
-
-
-def test_headers_declare_functions_of_c(gantry: Robot) -> None:
-    files = c_files(gantry, gantry.values(()))
-    headers = {name: content for name, content in files.items() if b"void " in content}
-    headers = {name: content for name, content in headers.items() if name.endswith(".h")}
-    assert headers
-    assert all(b'extern "C"' in content for content in headers.values())

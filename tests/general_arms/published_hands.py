@@ -209,20 +209,6 @@ def px150_urdf() -> str:
     return _with_boxes(urdf("px150", PX150), PX150_BOXES)
 
 
-def closing_upwards(text: str) -> str:
-    """Return ``text`` of a PincherX-150 whose fingers have the opposite axis and range."""
-    for old, new in (
-        ('<axis xyz="0.0 1.0 0.0"/>\n  <limit lower="0.015" upper="0.037"', "left"),
-        ('<axis xyz="0.0 1.0 0.0"/>\n  <limit lower="-0.037" upper="-0.015"', "right"),
-    ):
-        assert text.count(old) == 1
-        low, high = ("-0.037", "-0.015") if new == "left" else ("0.015", "0.037")
-        text = text.replace(
-            old, f'<axis xyz="0.0 -1.0 0.0"/>\n  <limit lower="{low}" upper="{high}"'
-        )
-    return text
-
-
 def _with_boxes(text: str, boxes: list[Box]) -> str:
     """Return the description with ``boxes`` for links without shapes."""
     for link in {box.link for box in boxes}:

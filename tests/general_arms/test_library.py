@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import katana450
+from katana450.extensions.programs.run.simulation import plan_script
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry import so3
 from tests.robot.hands import hand
 from tests.robot.public_arms import PX100, two_sided, written
@@ -101,21 +103,12 @@ def test_notes_say_how_poses_are_solved(urdf: Urdf) -> None:
     assert twisted.method in twisted.notes[0]
 
 
-def test_five_axis_arm_of_the_family_stays_what_it_was(urdf: Urdf) -> None:
-    arm = katana450.load(urdf("px150"))
-    assert arm.method.startswith("closed form for five axes")
-    assert arm.ik(arm.fk(arm.ready)).branches[0] == katana450.Branch("front", "up")
-
-
-def test_map_of_reachability_is_that_of_six_axes(urdf: Urdf) -> None:
-    reachability = load(urdf("ur5")).reachability(0.4)
-    assert len(reachability.points) > 10
-    assert ((reachability.fraction > 0.0) & (reachability.fraction <= 1.0)).all()
-
-
 def test_two_axes_are_no_arm(tmp_path: Path) -> None:
+    path = written(tmp_path, "two", PX100[:2])
     with pytest.raises(katana450.RobotDescriptionError, match="has 2 axes"):
-        load(written(tmp_path, "two", PX100[:2]))
+        load(path)
+    with pytest.raises(katana450.KatanaError, match="axes"):
+        plan_script(parse("steps:\n  - home\n"), path)
 
 
 @pytest.mark.cases(2)

@@ -104,30 +104,6 @@ def test_tool_is_moved_turned_and_stepped_and_undone(tmp_path: Path) -> None:
         np.testing.assert_allclose(pose(arm), T, atol=1e-6)
 
 
-def test_each_branch_moves_the_arm_or_has_its_reason(tmp_path: Path) -> None:
-    with served(tmp_path, chain_urdf("arm", OPENMANIPULATOR_X)) as (arm, _):
-        choices = arm.query(answers.Branches).choices
-        names = [choice.name for choice in choices]
-        assert names == ["front-up", "front-down", "back-up", "back-down"]
-        assert [bool(choice.refusal) for choice in choices] == [False, True, False, True]
-        for choice in choices:
-            arm.ask(requests.Home(wait=30))
-            before = state(arm)
-            done = arm.ask(requests.Branch(name=choice.name, wait=30))
-            assert isinstance(done, answers.Done)
-            assert done.end is not None
-            after = state(arm)
-            if done.end.how == "failed":
-                # No path, or a contact at its end, or the limits: the reason says which.
-                assert done.end.why
-                assert ("exclude the branch" in done.end.why) == bool(choice.refusal)
-                np.testing.assert_array_equal(after.q, before.q)
-            else:
-                assert not choice.refusal
-                assert "-".join(after.branch or ()) == choice.name
-                np.testing.assert_allclose(after.q, choice.q, atol=1e-6)
-
-
 def wall_beside(session: Session) -> tuple[SceneObject, float]:
     """Return a wall to the left (1) or right (-1) of the arm at Home, and that side."""
     model = session.require_arm()

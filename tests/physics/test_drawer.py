@@ -110,16 +110,6 @@ def test_drawer_is_pulled_by_its_handle(session: Session) -> None:
     assert ticked(session, rest, ticks=5).objects is rest.objects
 
 
-@pytest.mark.long
-def test_pulled_drawer_has_the_same_bits_in_another_session(session: Session) -> None:
-    other = describe_robot(Settings(), URDF_PATH, None).session
-    one, two = ([*islice(pulled(rules, 0.1), 20)][-1] for rules in (session, other))
-    assert one.bodies is not None
-    assert two.bodies is not None
-    for field in ("place", "velocity", "memory", "fingers"):
-        assert getattr(one.bodies, field).tobytes() == getattr(two.bodies, field).tobytes()
-
-
 def test_recording_holds_the_joint(session: Session) -> None:
     state, codec = begun(session, DRAWER, 0.3), Codec()
     copy = codec.decoded(State, json.loads(json.dumps(codec.encoded(state))))

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.maths.collision.shape import sphere
 from katana450.maths.geometry.arrays import frozen
 from katana450.maths.physics.model import REST_TIME
 from tests.physics.scenes import (
@@ -97,14 +96,6 @@ def test_hit_body_at_rest_gets_the_momentum_it_would_get_awake(ratio: float) -> 
         assert after[0] == pytest.approx(after[1], abs=0.05)
         final.append(motions[-1].place[:, 0])
     assert final[1] == pytest.approx(final[0], abs=1e-3)
-
-
-def test_ball_wakes_the_body_it_falls_on() -> None:
-    scene = Scene({body("box"): pose(0.0, 0.0, HALF), body("ball", sphere(0.02), mass=1.0): pose(
-        0.02, 0.0, 0.3)})  # fmt: skip
-    motions = [*scene.motions(scene.begin("box"), 1.0)]
-    assert any(not motion.resting[0] for motion in motions)
-    assert motions[10].resting[0]
 
 
 def test_slow_body_beside_one_at_rest_lets_it_rest() -> None:

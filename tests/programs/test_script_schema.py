@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,7 +32,7 @@ def scripts() -> Iterator[tuple[str, str]]:
     """Yield the name and the text of every script of the project."""
     library = ROOT / "app" / "katana450" / "extensions" / "programs" / "library"
     for folder in (ROOT / "examples" / "programs", library):
-        for path in sorted(folder.glob("*.yaml")):
+        for path in sorted(folder.rglob("*.yaml")):
             yield path.name, path.read_text(encoding="utf-8")
     for page in ("README.md", "docs/programs.md"):
         blocks = re.findall(r"```yaml\n(.*?)```", (ROOT / page).read_text("utf-8"), re.DOTALL)
@@ -66,8 +67,9 @@ def mappings(schema: Schema) -> list[dict[str, Any]]:
 def test_schema_is_a_schema_and_the_file_for_editors_is_current() -> None:
     Draft202012Validator.check_schema(script_schema())
     assert FILE.read_text(encoding="utf-8") == content(), "run `python -m docs.script_schema`"
-    for path in FILE.parent.glob("*.yaml"):
-        assert f"$schema={FILE.name}" in path.read_text(encoding="utf-8").splitlines()[0]
+    for path in FILE.parent.rglob("*.yaml"):
+        schema = Path(os.path.relpath(FILE, path.parent)).as_posix()
+        assert f"$schema={schema}" in path.read_text(encoding="utf-8").splitlines()[0]
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

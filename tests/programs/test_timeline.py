@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Moment, moments
 from katana450.extensions.programs.script.script_files import library_file, script_text
-from katana450.maths.water.units import MILLILITRE
 from tests.programs.conftest import Stage
 
 
@@ -35,28 +33,6 @@ def test_moments_are_on_the_clock_of_the_program(poured: tuple[Program, list[Mom
             near = min(moments, key=lambda moment: abs(moment.t - task.end))
             assert near.t == pytest.approx(task.end, abs=0.05)
             np.testing.assert_allclose(near.state.q, action.plan.end, rtol=0, atol=0.03)
-
-
-def test_cup_is_carried_and_emptied(stage: Stage, poured: tuple[Program, list[Moment]]) -> None:
-    program, moments = poured
-    carried = [moment.t for moment in moments if any(o.held for o in moment.state.objects)]
-    assert 0.1 * program.duration < carried[0] < carried[-1] < program.duration
-    levels = [
-        (moment.state.poured.water.cup.volume, moment.state.poured.water.basin)
-        for moment in moments
-        if moment.state.poured is not None
-    ]
-    assert levels[0][0] == pytest.approx(200 * MILLILITRE, abs=1)
-    assert levels[0][1] == 0
-    assert levels[0][0] - MILLILITRE < levels[-1][1] <= levels[0][0]
-    assert all(before[1] <= after[1] for before, after in pairwise(levels))
-    # The cup is in the hand wherever it is held.
-    for moment in moments:
-        for scene_object in moment.state.objects:
-            if scene_object.held:
-                T = stage.session.environment.pose(scene_object, moment.state.x)
-                assert np.linalg.norm(T[:3, 3]) > 0.2
-                assert T[2, 3] > -1e-3
 
 
 def test_stop_and_pause_of_the_arm_do_not_hinder_the_preview(stage: Stage) -> None:

@@ -374,14 +374,3 @@ def test_batches_are_written_as_single_ticks_are(folder: Path) -> None:
     assert written[0] == written[1]
     assert len(places[0]) > 100
     assert np.abs(places[0] - places[1]).max() < 2e-6
-
-
-def test_findings_are_events(folder: Path) -> None:
-    store = Ring(folder, header())
-    run(400, 8, store.put)
-    store.close()
-    (path,) = recordings_in(folder)
-    with RecordingFile.open(path) as file:
-        events = [message.data for message in file.messages(EVENTS)]
-        assert file.counts()[STATE] > 0
-    assert any(b'"began":true' in event for event in events)

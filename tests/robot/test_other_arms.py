@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.robot.arm_reader import MountedArm
@@ -21,14 +20,11 @@ from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.tool import pitch_and_roll, pitched_frame
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
-from tests.cli.lines import ask
 from tests.collision.distances import distances
 from tests.robot.public_arms import PX150, urdf
 from tests.robot.urdf_files import edited, saved
-from tests.ticks import rested
 
 ROOT = Path(__file__).resolve().parents[2]
 ARMS = Path(__file__).parent / "arms"
@@ -97,25 +93,6 @@ def test_ready_posture_has_room_to_move(other: MountedArm) -> None:
     assert abs(tool[1, 3]) < 1e-12
 
 
-def test_dragging_keeps_the_coordinates_that_are_not_dragged(other: MountedArm) -> None:
-    chain = other.chain
-    session = Session(other, other.ready(Settings().ready))
-    state = session.begin(session.ready, 0.0, 0.0)
-    start = forward(chain, state.goal)[:3, 3]
-    pitch, roll = pitch_and_roll(chain, state.goal)
-    moved = start + np.array([0.01, 0.03, 0.02])
-    state = session.step(state, [cmd.Position(moved)], 0.01)
-    assert state.findings == ()
-    np.testing.assert_allclose(forward(chain, state.goal)[:3, 3], moved, atol=1e-12)
-    assert pitch_and_roll(chain, state.goal) == pytest.approx((pitch, roll), abs=1e-12)
-    state = session.step(state, [cmd.Turn(pitch + 0.1, roll + 0.4)], 0.02)
-    np.testing.assert_allclose(forward(chain, state.goal)[:3, 3], moved, atol=1e-12)
-    assert pitch_and_roll(chain, state.goal) == pytest.approx((pitch + 0.1, roll + 0.4), abs=1e-12)
-    # A positive pitch points the roll axis down.
-    axis = pitched_frame(chain, state.goal)[:, 0]
-    assert math.asin(-axis[2]) == pytest.approx(pitch + 0.1, abs=1e-12)
-
-
 def test_links_without_shapes_are_drawn_as_rods() -> None:
     robot = load(YOUBOT)
     bodies = {body.name: body for body in robot.links}
@@ -127,16 +104,6 @@ def test_links_without_shapes_are_drawn_as_rods() -> None:
     np.testing.assert_allclose(box.mesh.bounds.mean(axis=0), [0.0165, 0.0, 0.0], atol=1e-12)
     assert "foot" not in robot.moving
     assert "tip" in robot.moving
-
-
-def test_kinematics_are_answered_line_by_line() -> None:
-    q, arm = [0.3, -0.2, 0.5, 0.4, 0.7], load(PINCHER).require_arm()
-    (answer,) = ask("fk", [{"q": q}], "--urdf", str(PINCHER), "--tool", "hand")
-    hand = load(PINCHER, "hand").require_arm()
-    np.testing.assert_allclose(np.array(answer["T"]), forward(hand.chain, q), atol=1e-15)
-    (answer,) = ask("ik", [{"T": forward(arm.chain, q).tolist()}], "--urdf", str(PINCHER))
-    assert any(np.allclose(s["q"], q) for s in answer["solutions"])
-    assert answer["residual_mm"] < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -302,23 +269,3 @@ def test_no_distance_changes_more_than_their_bodies_travel(
         assert (change <= travel + 2e-6)[apart].all()
         tightest = max(tightest, float((change / np.maximum(travel, 1e-6))[apart].max()))
     assert tightest > 0.5
-
-
-def test_they_hold_and_release_an_object(
-    robot: Robot, arm: MountedArm, world: CollisionWorld
-) -> None:
-    ready = arm.ready(Settings().ready)
-    fingers = np.array([-0.027575, 0.0, 0.0])
-    T = arm.T_base_shoulder @ forward(arm.chain, ready)
-    T[:3, 3] += T[:3, :3] @ fingers
-    width = 0.05
-    scene_object = SceneObject("block", Shape.BOX, (0.02, width, 0.02), T, can_be_held=True)
-    session = Session(arm, ready, world, hand=hand_of(robot, world), objects=(scene_object,))
-    state = session.begin(ready, arm.gripper.upper, 0.0)
-    state = rested(session, state, cmd.Gripper(arm.gripper.lower))
-    (held,) = state.objects
-    assert held.held
-    inside = 0.5 * (width + THICK)
-    assert state.gripper_setpoint == pytest.approx(inside, abs=1e-3)
-    left = rested(session, state, cmd.Gripper(state.gripper_setpoint + 2e-3))
-    assert not left.objects[0].held
