@@ -285,11 +285,6 @@ class ViserPage:
         with self.grip_arrow(node, axis) as grip:
             grip.sweep(metres, steps)
 
-    def drag_ring(self, node: str, axis: Axis, radians: float, *, steps: int = DRAG_STEPS) -> None:
-        """Turn a control about one of its own axes, right-handed, and release it."""
-        with self.grip_ring(node, axis) as grip:
-            grip.sweep(radians, steps)
-
     # The panel
 
     def _label(self, label: str) -> Locator:
@@ -370,10 +365,6 @@ class ViserPage:
     def text_of(self, selector: str) -> str:
         """Return the text of the first element for a CSS selector."""
         return self.frame.locator(selector).first.inner_text()
-
-    def panel_text(self) -> str:
-        """Return all text that viser shows, in the panel and in notifications."""
-        return self.text_of("body")
 
     # Evidence
 

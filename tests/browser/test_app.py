@@ -16,7 +16,7 @@ from katana450.server.view.view import GHOST_COLOURS
 from tests.browser.page import ViserPage
 from tests.browser.session import AXES, Truth, go_home
 
-MOVE, PITCH = "/target/move", "/target/move/pitch"
+MOVE = "/target/move"
 
 # A dragged handle is within a pixel of its target: 1 mm at this distance.
 PIXEL = 2e-3
@@ -110,17 +110,6 @@ def test_arm_follows_the_dragged_arrow(robot: Robot, artefacts: Path) -> None:
     assert pitch_of(end) == pytest.approx(pitch_of(start), abs=1e-6)
     assert "On target" in robot.text()
     robot.page.keep(artefacts / "app-arrow.png")
-
-
-@pytest.mark.long
-def test_the_pitch_ring_turns_the_tool_about_its_point(robot: Robot, artefacts: Path) -> None:
-    start = robot.drawn()
-    robot.page.drag_ring(PITCH, "y", 0.25)
-    robot.settle()
-    end = robot.drawn()
-    assert end[:3, 3] == pytest.approx(start[:3, 3], abs=1e-6)
-    assert pitch_of(end) - pitch_of(start) == pytest.approx(0.25, abs=0.01)
-    robot.page.keep(artefacts / "app-pitch.png")
 
 
 @pytest.mark.long

@@ -1,6 +1,6 @@
-"""Jogging at the page: held keys, pads and buttons, steps, and the gripper.
+"""Jogging at the page: held keys, pads and buttons.
 
-What the sheet sends for keys, gamepads and a SpaceMouse is tested in ``test_page_logic``.
+What the sheet sends for keys, steps, gamepads and a SpaceMouse is tested in ``test_page_logic``.
 """
 
 from __future__ import annotations
@@ -18,16 +18,15 @@ from tests.browser.server import AppServer
 from tests.browser.session import Truth, camera, clear_stop
 
 EXACT = 2e-6
-"""[m] Tolerance of one step."""
+"""[m] Tolerance of a rest."""
 
 
 @pytest.fixture
 def sheet(own_page: ViserPage) -> Iterator[ViserPage]:
-    """Return our page with the Jog sheet and its steps open."""
+    """Return our page with the Jog sheet open."""
     own_page.page.click("#jog-button")
     own_page.page.wait_for_selector("#jog [name=step]", state="attached")
     yield own_page
-    own_page.page.locator("#jog [name=step][value='0']").check(force=True)
     own_page.page.click("#jog-button")
 
 
@@ -44,10 +43,6 @@ def at_rest(truth: Truth) -> Any:
 
 def wait_moved(page: ViserPage, truth: Truth, start: Any, axis: int, sign: int) -> None:
     page.wait_until(lambda: sign * (point(truth)[axis] - start[axis]) > 0.01, "the tool to move")
-
-
-def choose(page: ViserPage, value: str) -> None:
-    page.page.locator(f"#jog [name=step][value='{value}'] + span").click()
 
 
 @pytest.mark.long
@@ -133,19 +128,3 @@ def test_key_held_when_a_stop_is_cleared_moves_nothing(
     truth.wait(moving=True)
     sheet.page.keyboard.up("KeyA")
     truth.wait(moving=False)
-
-
-def test_one_press_is_one_step_and_none_while_stopped(sheet: ViserPage, truth: Truth) -> None:
-    start = at_rest(truth)
-    choose(sheet, "10")
-    sheet.page.get_by_role("button", name="z plus 10 mm").click()
-    place = np.add(start, (0.0, 0.0, 0.01))
-    sheet.wait_until(lambda: np.allclose(at_rest(truth), place, atol=EXACT), "the step")
-    sheet.page.keyboard.press("Space")
-    truth.wait(mood="stopped")
-    sheet.page.get_by_role("button", name="z plus 10 mm").click()
-    sheet.page.wait_for_selector("#toast.shown")
-    clear_stop(sheet, truth)
-    # The refused step is not carried out afterwards.
-    sheet.page.wait_for_timeout(200)
-    assert np.allclose(at_rest(truth), place, atol=EXACT)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +16,7 @@ from katana450.server.api import answers
 from tests.browser.camera import Drawing
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
-from tests.browser.server import APP, ATTENTIVE_APP, AppServer
+from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, take
 from tests.browser.test_app import Robot
 from tests.gateway.slow_link import DelayedLink, SlowLink
@@ -150,28 +147,6 @@ def test_closed_window_frees_the_arm_and_a_reloaded_one_keeps_it(
     truth.wait(2.0, holder=None)
     other.page.get_by_role("button", name="Take", exact=True).click()
     other.page.locator("#holder", has_text="You drive").wait_for()
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="finds the processes as Linux lists them")
-@pytest.mark.long
-@pytest.mark.parametrize("process", ["arm", "front"])
-def test_page_outlasts_each_process_and_shows_the_truth(open_page: OpenPage, process: str) -> None:
-    with AppServer(APP) as server:
-        truth = Truth(server)
-        page = open_page(server.url, nodes=("/arm", MOVE))
-        page.type_number("1 base turn", -150.0)
-        truth.wait(mood="moving")
-        os.kill(server.child(f"katana450 {process}"), signal.SIGSTOP)
-        # The same for both: what the page shows is marked as old.
-        lost = '[data-mood="lost"], [data-mood="starting"], #banner:not([hidden])'
-        page.page.wait_for_selector(lost, timeout=2000)
-        page.page.locator("#headline", has_text="Stopped").wait_for(timeout=60_000)
-        page.page.wait_for_selector("#banner", state="hidden", timeout=30_000)
-        page.wait_until(lambda: page.connected, "viser to come back")
-        clear_stop(page, truth)
-        rest = truth.status()["q"]
-        page.page.wait_for_timeout(200)
-        assert truth.status()["q"] == rest
 
 
 def test_page_whose_line_has_become_slow_moves_nothing_after_letting_go(

@@ -18,7 +18,8 @@ from tests.browser.session import Truth, bar
 from tests.browser.sight import contrast
 from tests.browser.sizes import PHONE, PORTRAIT
 from tests.browser.test_accessibility import findings
-from tests.browser.test_objects import drop, zipped
+from tests.browser.test_objects import drop
+from tests.exchange.shape_bytes import zipped
 from tests.extensions.test_robot_choice import urdf
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import base64
-import io
 import json
 import re
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +19,7 @@ from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, bar, clear_stop
 from tests.exchange.compressed_gltf import DATA, SQUARE
+from tests.exchange.shape_bytes import zipped
 
 DROP = """async ([files, [clientX, clientY] = []]) => {
     const data = new DataTransfer();
@@ -80,15 +79,6 @@ def shown(page: ViserPage) -> str:
 def cube(side: float, kind: str = "stl") -> bytes:
     content = trimesh.creation.box((side, side, side)).export(file_type=kind)
     return content.encode() if isinstance(content, str) else bytes(content)
-
-
-def zipped(files: dict[str, bytes]) -> bytes:
-    """Return an archive of ``files``."""
-    archive = io.BytesIO()
-    with zipfile.ZipFile(archive, "w") as content:
-        for name, data in files.items():
-            content.writestr(name, data)
-    return archive.getvalue()
 
 
 def clear_refusals(page: ViserPage) -> None:

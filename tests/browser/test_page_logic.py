@@ -329,6 +329,11 @@ def test_elbow_of_seven_axes_moves_while_the_tool_rests(browser: Browser) -> Non
         key(page, "up", "KeyW")
         key(page, "up", "KeyH")
         rests(page)
+        # With six freedoms the tool also turns about the vertical.
+        key(page, "down", "KeyQ")
+        moves(page, 5, 1)
+        key(page, "up", "KeyQ")
+        rests(page)
         page.evaluate("() => { pad.buttons[4].pressed = pad.buttons[6].pressed = true }")
         moves(page, 6, -1)
         page.evaluate("() => { pad.buttons[4].pressed = pad.buttons[6].pressed = false }")

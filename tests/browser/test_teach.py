@@ -15,7 +15,7 @@ from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import taught
 from tests.browser.instruments import dial, show
 from tests.browser.page import ViserPage
-from tests.browser.session import Truth, bar, clear_stop, go_home, mood, prepare
+from tests.browser.session import Truth, bar, clear_stop, go_home
 from tests.browser.teach_sheet import (
     PLAYED,
     drag,
@@ -146,35 +146,6 @@ def test_run_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> No
     assert truth.status()["q"] == q
 
 
-def test_script_of_the_folder_is_opened_and_undone(
-    window: ViserPage, truth: Truth, artefacts: Path
-) -> None:
-    prepare(window, truth)
-    page = window.page
-    text = "steps:\n  - joints: [0, -68, 85, 8, 0]\n"
-    saved = page.evaluate(
-        "async (body) => (await fetch('api/v1/scripts/Taught', { method: 'POST', body })).status",
-        text,
-    )
-    assert saved == 204
-    open_sheet(window)
-    program = page.locator("#teach").get_by_label("Program", exact=True)
-    program.select_option("Taught")
-    # It has only poses.
-    window.wait_until(lambda: rows(window).count() == 1, "the pose")
-    assert program.locator("option:checked").inner_text() == "Taught"
-    press(window, "Text")
-    area = page.locator("#teach-text")
-    assert "joints: [0, -68, 85, 8, 0]" in area.input_value()
-    assert page.locator("#teach-problems li").count() == 0
-    window.keep(artefacts / "programs-text.png")
-    for _ in range(3):
-        press(window, "Undo in Programs")
-    # What was there before returns.
-    window.wait_until(lambda: rows(window).count() == 0, "the empty list")
-    assert window.errors == []
-
-
 @pytest.mark.long
 def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefacts: Path) -> None:
     teach(sheet, truth, (20.0, -25.0))
@@ -217,46 +188,23 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
 
 
 @pytest.mark.long
-def test_space_is_typed_in_the_text_of_a_moving_arm_and_escape_stops_it(
-    sheet: ViserPage, truth: Truth, artefacts: Path
-) -> None:
-    press(sheet, "Text")
-    area = sheet.page.locator("#teach-text")
-    text = "name: Slow\nspeed: 0.05\nsteps:\n  - joints: [60, -68, 85, 8, 0]\n"
-    area.fill(text)
-    press(sheet, "Run")
-    area.focus()
-    truth.wait(PLAYED, moving=True)
-    sheet.wait_until(lambda: mood(sheet.page) == "program", "the bar")
-    sheet.page.keyboard.press("Control+End")
-    sheet.page.keyboard.press("Space")
-    assert area.input_value() == f"{text} "
-    sheet.page.wait_for_timeout(200)
-    assert truth.status()["stopped"] is None
-    # The button says which key stops now.
-    key = "getComputedStyle(document.getElementById('stop'), '::after').content"
-    assert "Esc" in sheet.page.evaluate(key)
-    sheet.keep(artefacts / "teach-text-moving.png")
-    sheet.page.keyboard.press("Escape")
-    truth.wait(mood="stopped")
-    assert area.input_value() == f"{text} "
-    sheet.wait_until(lambda: bar(sheet, "headline") == "Stopped", "the bar")
-    clear_stop(sheet, truth)
-
-
-@pytest.mark.long
 def test_space_stops_the_arm_from_everything_but_a_text(sheet: ViserPage, truth: Truth) -> None:
     page = sheet.page
 
-    def stops(what: str) -> None:
-        """Press Space, which must stop the arm, and clear the stop."""
-        page.keyboard.press("Space")
+    def stops(what: str, key: str = "Space") -> None:
+        """Press ``key``, which must stop the arm, and clear the stop."""
+        page.keyboard.press(key)
         truth.wait(mood="stopped")
         clear_stop(sheet, truth)
         assert truth.status()["stopped"] is None, what
 
     press(sheet, "Text")
     area = page.locator("#teach-text")
+    area.click()
+    # The button says which key stops now.
+    key = "getComputedStyle(document.getElementById('stop'), '::after').content"
+    assert "Esc" in page.evaluate(key)
+    stops("the text", "Escape")
     area.click()
     # A press in the scene is the end of typing.
     page.mouse.click(500.0, 250.0)

@@ -33,19 +33,6 @@ def level_at(cylinder: Cylinder, tilt: float, fraction: float) -> float:
     return low + fraction * (high - low)
 
 
-def summed_up(cylinder: Cylinder, tilt: float, level: float) -> float:
-    """Return the volume by columns parallel to the axis, each up to its wet height."""
-    r = np.sqrt((np.arange(300) + 0.5) / 300.0) * cylinder.radius
-    turn = (np.arange(300) + 0.5) * (math.tau / 300.0)
-    below = level - math.sin(tilt) * np.outer(r, np.cos(turn))
-    end = below / math.cos(tilt)
-    if math.cos(tilt) > 0.0:
-        wet = np.clip(end, 0.0, cylinder.depth)
-    else:
-        wet = cylinder.depth - np.clip(end, 0.0, cylinder.depth)
-    return float(wet.mean()) * math.pi * cylinder.radius**2
-
-
 @repeatable
 @given(cylinders, tilts, fractions)
 def test_volumes_of_both_sides_add_up(cylinder: Cylinder, tilt: float, fraction: float) -> None:
