@@ -17,7 +17,6 @@ from katana450.arm.control.state.state import Reason
 from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot, loads_of
 from katana450.client import Client, RefusedError
-from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.statics import holding_torques
@@ -278,16 +277,6 @@ def check_printed(program: Client, T: FloatArray, decimals: int) -> None:
     assert 1e-3 * rounding < accepted.rotation_misfit < 4.0 * rounding
     state = program.go(requests.Pose(T=printed))
     np.testing.assert_allclose(np.array(state.T), T, rtol=0, atol=10.0 * rounding)
-
-
-def test_skewed_pose_is_refused_with_the_error(program: Client) -> None:
-    skewed = np.eye(4)
-    skewed[0, 1] = 2e-3
-    reason = r"off orthonormal by 0\.002 \(allowed: 1e-03\)"
-    with pytest.raises(InputError, match=reason):
-        requests.Pose(T=skewed)
-    with pytest.raises(RefusedError, match=reason):
-        program.ask(requests.Place(name="block", shape=Shape.BOX, size=[0.02] * 3, T=skewed))
 
 
 def test_object_is_placed_near_a_point_of_the_table(program: Client) -> None:

@@ -110,16 +110,6 @@ async def test_broken_message_changes_nothing(server: AppServer) -> None:
             assert await good.listen(BRIEF) == [], name
 
 
-async def test_sender_of_repeated_bad_messages_is_disconnected(server: AppServer) -> None:
-    async with peers(server.url) as (bad, good):
-        with suppress(ConnectionClosed):
-            for _ in range(20):
-                await bad.socket.send(b"\xff\x00\x01")
-                await bad.listen(0.02)
-        assert bad.socket.close_code == 1008
-        assert await good.listen(BRIEF) == []
-
-
 async def test_message_that_no_page_sends_changes_nothing(server: AppServer) -> None:
     async with opened(server.url) as (bad, _), opened(server.url) as (good, control):
         await control.say("take")
@@ -227,6 +217,7 @@ async def test_flooding_client_is_closed_without_effect_on_others(server: AppSer
             trips = [await round_trip(control) for _ in range(10)]
             async with asyncio.timeout(10.0):
                 await flooding
+            assert bad.socket.close_code == 1008
         assert sorted(trips)[5] < 0.1
         heard = await moves_the_arm(good, 2.0)
         assert any(m["type"] == "SetOrientationMessage" for m in heard)

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import CommandChannel, Person, Role
+from katana450.arm.control.lease import Person, Role
 from katana450.errors import InputError
 from katana450.server.service import people as people_module
 from katana450.server.service import status
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import MAX_NAME, MAX_PAGES, actor_of, renamed
+from katana450.server.service.participants import MAX_NAME, MAX_PAGES, renamed
 from katana450.server.service.people import Connection
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.authenticator import KICKED
@@ -62,15 +62,6 @@ def test_http_programs_without_links_are_kept_out_together(local: VirtualServer)
 
 VERA = Identity("vera", "Vera", Role.VIEWER, "Vera")
 ODA = Identity("oda", "Oda", Role.OPERATOR, "Oda")
-
-
-def test_every_press_of_an_absent_person_stops_the_arm(table: Table) -> None:
-    driver = table.join(PAGES[0])
-    table.hub.people.kick(VERA, 60.0)
-    for _ in range(2):
-        table.hub.stop(actor_of(VERA, CommandChannel.PAGE))
-        assert table.hub.stopped is not None
-        table.hub.move(driver, cmd.ClearStop())
 
 
 def test_people_are_shown_while_they_are_connected_or_kept_out(table: Table) -> None:

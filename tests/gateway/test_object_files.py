@@ -44,9 +44,3 @@ def test_a_large_object_is_placed_with_its_scale(local: VirtualServer, program: 
     with pytest.raises(RefusedError, match=r"must be from 0.001 to 2 m.*Change its scale"):
         program.ask(place)
     program.ask(structs.replace(place, scale=mesh["scale"]))
-
-
-def test_a_missing_file_is_named(local: VirtualServer) -> None:
-    status, answer = upload(local, ARTICULATED["robot.wrl"].encode(), name="robot.wrl")
-    assert status == 422
-    assert "not there: parts/arm.wrl, parts/tool/grip.wrl. Add them" in str(answer["why"])

@@ -219,14 +219,6 @@ def test_program_ends_without_its_owner(table: Staged) -> None:
     assert table.status == "stopped"
 
 
-def test_another_window_does_not_steer_it(table: Staged) -> None:
-    owner, other = (table.join(page, Role.OPERATOR) for page in PAGES)
-    run(table, owner)
-    with pytest.raises(LeaseError, match="belongs to"):
-        table.programs.steer(other, ProgramOrder.END)
-    assert table.programs.orders(other) == ()
-
-
 def test_owner_must_be_there_when_a_planned_program_begins(table: Staged, session: Session) -> None:
     """The owner falls silent before the planning ends: nothing begins to move."""
     owner = table.join(PAGES[0])

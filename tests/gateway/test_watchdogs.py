@@ -23,7 +23,6 @@ from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
 from tests.gateway.client import ask, healthy, state_of
-from tests.gateway.lines import speaking
 from tests.gateway.postures import FAR
 from tests.waiting import until
 
@@ -182,29 +181,6 @@ def test_no_process_outlives_the_supervisor(number: signal.Signals) -> None:
             os.kill(server.pid, number)
             until(lambda: all(process_state(process) == "Z" for process in others), 10.0)
         assert all(process_state(process) == "Z" for process in others)
-
-
-def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
-    command = (*ATTENTIVE_APP, "--silence", "0.6", "--lines", "0")
-    with AppServer(command) as server, speaking(server, "Driver") as driver:
-        driver.say(do="joints", q=FAR.tolist())
-        until(lambda: driver.answer(do="query")["q"][0] >= 0.2, 20.0)
-        with server.frozen(server.arm):
-            end = time.monotonic() + 10.0
-            while state_of(server)["stopped"] is None:
-                driver.say(do="heartbeat")
-                assert time.monotonic() < end
-                time.sleep(0.1)
-            refused = driver.answer(do="clear_stop")
-            assert "has not answered" in refused["why"]
-        assert "did not answer" in str(state_of(server)["stopped"])
-        end = time.monotonic() + 5.0
-        while (state := state_of(server))["stop"] != "confirmed" or state["moving"]:
-            assert time.monotonic() < end
-            time.sleep(0.05)
-        assert driver.clear_stop()["is"] == "done"
-        time.sleep(0.5)
-        np.testing.assert_array_equal(state_of(server)["q"], state["q"])
 
 
 def under_way(arm: Client) -> answers.State:
