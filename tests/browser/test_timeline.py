@@ -139,7 +139,7 @@ def test_past_is_shown_in_one_window_until_stop(
     later = float(slider.input_value())
     assert later == pytest.approx(1.0, abs=0.01)
     # The arm may move at that moment, and the page asks for it to 10 ms.
-    moments = [run.at(run.spans[0].start + later + apart) for apart in (-0.02, 0.0, 0.02)]
+    moments = [run.at(at_place(run.spans, later + apart)) for apart in (-0.02, 0.0, 0.02)]
     turns = [moment.row.joints[0] for moment in moments if moment is not None]
     page.wait_until(
         lambda: min(turns) - 1e-6 <= shown_turn(page) <= max(turns) + 1e-6, "the posture 1 s later"
