@@ -13,6 +13,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import Submission
 from katana450.errors import InputError
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import MOMENT, recorded_input, state_after
 from katana450.extensions.recording.messages import COMMANDS
@@ -25,8 +26,15 @@ FORKS = 60 if LONG else 8
 SECONDS = 5.0 if LONG else 0.5
 """[s] Time for which a continuation is compared with the recording."""
 
-PICK = "script: 1\nsteps:\n- home\n- pick: cup\n- place: {object: cup, at: [300, 150]}\n"
-POUR = "script: 1\nsteps:\n- demo: pour\n"
+GRASP = """frame: base
+steps:
+  - grasp: cup
+  - line: {by: {z: 60}}
+  - nudge: {axis: 1, by: 10}
+  - line: {by: {z: -52}}
+  - gripper: open
+"""
+"""Script that carries the cup, and lets it fall by 8 mm."""
 
 
 def random_session(path: Path) -> Path:
@@ -47,8 +55,10 @@ def scripted(text: str, ticks: int) -> Callable[[Path], Path]:
     [
         pytest.param(random_session, id="random"),
         pytest.param(dragged, id="drag", marks=pytest.mark.long),
-        pytest.param(scripted(PICK, 2500), id="pick", marks=pytest.mark.long),
-        pytest.param(scripted(POUR, 3500), id="pour", marks=pytest.mark.long),
+        pytest.param(scripted(GRASP, 1500), id="grasp", marks=pytest.mark.long),
+        pytest.param(
+            scripted(script_text(library_file("pour")), 3500), id="pour", marks=pytest.mark.long
+        ),
     ],
 )
 def test_forks_continue_as_the_recording(make: Callable[[Path], Path], tmp_path: Path) -> None:
