@@ -51,7 +51,8 @@ class _Buffer:
 
 
 def _vectors(buffer: _Buffer, values: NDArray[np.float32], bounds: bool) -> int:
-    rows = values.astype("<f4")
+    # The sum makes a zero of a negative one, whose sign depends on how a processor adds.
+    rows = (values + np.float32(0.0)).astype("<f4")
     extent = {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()} if bounds else {}
     return buffer.add(rows, _ARRAY, componentType=_FLOAT, count=len(rows), type="VEC3", **extent)
 

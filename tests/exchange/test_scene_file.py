@@ -78,7 +78,8 @@ def objects(draw: st.DrawFn, name: str) -> SceneObject:
     colour = draw(st.none() | st.tuples(*(st.integers(0, 255),) * 3))
     look = ObjectAppearance(colour, draw(st.floats(0.05, 1.0)), draw(st.booleans()))
     size = draw(st.lists(st.floats(0.01, 1.0), min_size=form.numbers, max_size=form.numbers))
-    zone = Zone.NONE if form is Shape.VESSEL else draw(st.sampled_from(Zone))
+    zones = {Shape.VESSEL: [Zone.NONE], Shape.PLANE: [Zone.KEEP_OUT, Zone.SLOW]}
+    zone = draw(st.sampled_from(zones.get(form, list(Zone))))
     is_zone = zone is not Zone.NONE
     return SceneObject(
         name,
