@@ -23,13 +23,11 @@ QUINTIC = np.array(
     ]
 )
 """The map from the control points of a Bezier curve of degree 5 to its coefficients, lowest power
-first.
-"""
+first."""
 
 STRETCH = 2.5
 """Ratio [1] of a corner's length in sigma to its reach along either leg, which makes the speed at
-its ends equal to that of the legs.
-"""
+its ends equal to that of the legs."""
 
 
 class PiecewisePolynomial:
@@ -112,9 +110,8 @@ class Polyline(PiecewisePolynomial):
                 points = (before, 0.5 * (before + via), via, via, 0.5 * (via + after), after)
                 corner_length = STRETCH * float(reach)
                 starts.append(station)
-                terms.append(
-                    (QUINTIC @ np.array(points)) / corner_length ** np.arange(6.0)[:, None]
-                )
+                curve = QUINTIC @ np.array(points)
+                terms.append(curve / corner_length ** np.arange(6.0)[:, None])
                 station += corner_length
         object.__setattr__(self, "_starts", starts)
         object.__setattr__(self, "_terms", frozen(terms))
@@ -122,11 +119,13 @@ class Polyline(PiecewisePolynomial):
 
 
 def _polynomial(terms: list[float] | FloatArray, t: Jet) -> Jet:
-    """Return the polynomial at `t` by Horner's rule.
-
-    `terms` are floats or (k, N), the lowest power first.
-    """
-    value = Jet.constant(terms[-1])
+    """Return the polynomial of `terms`, the lowest power first, at `t` by Horner's rule."""
+    b0, b1, b2, b3 = t.c0, t.c1, t.c2, t.c3
+    a0, a1, a2, a3 = terms[-1], 0.0, 0.0, 0.0
     for term in terms[-2::-1]:
-        value = value * t + term
-    return value
+        # Without a jet of each product, because this runs for each joint at each place of a path.
+        a3 = a0 * b3 + a1 * b2 + a2 * b1 + a3 * b0
+        a2 = a0 * b2 + a1 * b1 + a2 * b0
+        a1 = a0 * b1 + a1 * b0
+        a0 = a0 * b0 + term
+    return Jet(a0, a1, a2, a3)
