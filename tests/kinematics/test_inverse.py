@@ -21,6 +21,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse_batch import inverse_batch
 from katana450.maths.kinematics.solution import Solution
 from katana450.maths.kinematics.solver import Solver, inverse
+from tests.conftest import LONG
 from tests.kinematics.by_subproblems import matched, same, solve
 from tests.kinematics.family import (
     KATANA,
@@ -32,8 +33,8 @@ from tests.kinematics.family import (
     random_pose,
 )
 
-MEMBERS, POSES = 200, 10
-KATANA_POSES = 500
+MEMBERS, POSES = 200 if LONG else 80, 10 if LONG else 5
+KATANA_POSES = 500 if LONG else 150
 
 POSITION, ROTATION = 1e-14, 1e-12
 """[m] and [rad]; {S} may be two metres away, where forward kinematics is no more accurate."""
@@ -156,7 +157,7 @@ def assert_exact(chain: Chain, q: FloatArray, T: FloatArray, within: float) -> N
     [(0.0, 1e-6), (1e-9, 1e-6), (math.pi, 1e-6), (math.pi - 1e-7, 1e-6), (1e-4, 1e-9)],
 )
 def test_stretched_and_folded(three: float, within: float, rng: np.random.Generator) -> None:
-    for chain in arms(rng, 60):
+    for chain in arms(rng, 60 if LONG else 30):
         q, T = at_canonical(chain, [*rng.uniform(-3.0, 3.0, 2), three, *rng.uniform(-3.0, 3.0, 2)])
         assert_exact(chain, q, T, within)
 
@@ -164,7 +165,7 @@ def test_stretched_and_folded(three: float, within: float, rng: np.random.Genera
 @pytest.mark.parametrize("u", [0.0, 1e-15, 1e-12, -1e-9, 1e-7, -1e-5, 1e-3])
 def test_tool_point_on_and_near_axis_1(u: float, rng: np.random.Generator) -> None:
     """Test a tool point at the distance u from axis 1, or from the cylinder about it."""
-    for chain in arms(rng, 90):
+    for chain in arms(rng, 90 if LONG else 40):
         arm = arm_of(chain)
         two, three, four = rng.uniform(-3.0, 3.0, 3)
         reach = np.cumsum([two, three, four])
@@ -216,7 +217,7 @@ def test_near_axis_1_no_digit_is_lost(
     forward kinematics does not dominate.
     """
     number = 0
-    while number < 60:
+    while number < (60 if LONG else 25):
         offsets = random_offsets(rng, lateral=lateral)
         chain = member(offsets, np.eye(4), np.eye(4))
         sign, scale = float(rng.choice((-1.0, 1.0))), rng.uniform(1.0, 9.0)
@@ -256,7 +257,7 @@ def test_rounding_in_a_file_keeps_a_solution_exact(rng: np.random.Generator) -> 
 
     A wrong yaw does not count as rounding.
     """
-    for number in range(200):
+    for number in range(200 if LONG else 60):
         chain, _ = random_member(rng)
         if number % 2:
             chain = chain.with_tool(chain.M @ random_pose(rng, 0.03))

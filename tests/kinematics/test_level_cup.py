@@ -16,6 +16,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import pitch_and_roll
+from tests.conftest import LONG
 from tests.kinematics.family import limited_member, random_pose
 
 LEVEL = 1e-6
@@ -23,7 +24,7 @@ LEVEL = 1e-6
 
 FRONT = tuple(branch for branch in BRANCHES if branch.shoulder == "front")
 
-COUNT = 2_000
+COUNT = 2_000 if LONG else 600
 
 
 def ring(rng: np.random.Generator, count: int, reach: float) -> FloatArray:

@@ -12,6 +12,7 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.projection import project
+from tests.conftest import LONG
 from tests.kinematics.brute_force import least_rotation, nearest_point, planes, postures_at
 from tests.kinematics.conftest import katana
 from tests.kinematics.family import Offsets, limited_member, member, random_member, random_pose
@@ -62,7 +63,7 @@ def test_no_search_finds_a_nearer_point_or_turn(
 
 
 def test_every_branch_has_a_solution_and_the_best_is_taken(rng: np.random.Generator) -> None:
-    for _ in range(25):
+    for _ in range(25 if LONG else 8):
         chain = limited_member(rng)
         for T in targets(chain, rng, 1):
             best = project(chain, T)
