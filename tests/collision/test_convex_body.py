@@ -25,6 +25,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from robot_description.cad.build import PARTS
 from robot_description.cad.hulls import whole
+from tests.conftest import LONG
 
 
 def check_holds(body: ConvexBody, points: FloatArray) -> None:
@@ -43,7 +44,7 @@ def check_holds(body: ConvexBody, points: FloatArray) -> None:
     st.tuples(*(st.sampled_from((0.0, 1e-4, 0.01, 0.3, 1.0)),) * 3).filter(any),
     st.floats(0.01, 100.0),
 )
-@settings(max_examples=25)
+@settings(max_examples=25 if LONG else 12)
 def test_random_points_are_contained(
     count: int, seed: int, stretch: tuple[float, ...], scale: float
 ) -> None:
@@ -134,7 +135,7 @@ def test_no_solids_touch_where_the_bodies_are_clear(
 ) -> None:
     rng = np.random.default_rng(11)
     looked_at = 0
-    while looked_at < 40:
+    while looked_at < (40 if LONG else 12):
         x = rng.uniform(*limits)
         contact = bare.nearest(x)
         assert contact is not None

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
+from tests.conftest import LONG
 
-repeatable = settings(max_examples=80, derandomize=True, database=None)
+repeatable = settings(max_examples=80 if LONG else 40, derandomize=True, database=None)
 
 # Angles near 0, near pi, and in between.
 angles = st.one_of(

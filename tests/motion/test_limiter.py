@@ -11,6 +11,7 @@ from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
 from katana450.maths.motion.stream import Stream, braked, pursued
+from tests.conftest import LONG
 
 DT = 0.01
 LIMITS = Limits(
@@ -44,7 +45,7 @@ def check(before: JointMotion, after: JointMotion, dt: float = DT) -> None:
 
 def test_a_move_ends_at_rest_exactly_at_its_goal(limiter: Limiter) -> None:
     rng = np.random.default_rng(1)
-    for _ in range(40):
+    for _ in range(40 if LONG else 15):
         start, goal = inside(rng), inside(rng)
         motion = JointMotion.rest(start)
         for _ in range(2000):
@@ -63,7 +64,7 @@ def test_a_move_ends_at_rest_exactly_at_its_goal(limiter: Limiter) -> None:
 def test_goals_that_change_at_any_tick_keep_the_limits(limiter: Limiter) -> None:
     rng = np.random.default_rng(2)
     motion, goal, fraction = JointMotion.rest(inside(rng)), inside(rng), 1.0
-    for tick in range(8000):
+    for tick in range(8000 if LONG else 3000):
         if rng.random() < 0.15:
             # Limits are chosen as goals more often than chance would choose them.
             goal = inside(rng)
@@ -149,7 +150,7 @@ def test_fraction_of_the_speed_is_kept(limiter: Limiter) -> None:
 def test_rates_are_reached_and_brake_before_a_limit(limiter: Limiter) -> None:
     rng = np.random.default_rng(4)
     motion = JointMotion.rest(inside(rng))
-    for _ in range(60):
+    for _ in range(60 if LONG else 25):
         qd = rng.uniform(-1.5, 1.5, 5) * LIMITS.speed
         for _ in range(int(rng.integers(1, 150))):
             after = limiter.at_rate(motion, qd, DT)
@@ -229,7 +230,7 @@ def test_limits_hold_for_any_stream(seed: int) -> None:
     rng, limiter = np.random.default_rng(seed), Limiter(PURSUIT_LIMITS)
     now, bounds = JointMotion.rest(np.zeros(3)), (np.full(3, -0.7), np.full(3, 0.3))
     lowest = np.maximum(bounds[0], PURSUIT_LIMITS.lower)
-    for number in range(3000):
+    for number in range(3000 if LONG else 1000):
         if number % 20 == 0:
             wanted = JointMotion(*(rng.normal(scale=scale, size=3) for scale in (0.6, 2.0, 5.0)))
         dt = TICK if number % 7 else float(rng.uniform(0.002, 0.05))

@@ -196,7 +196,7 @@ def test_box_pushed_beside_its_middle_turns(offset: float) -> None:
 
 
 def test_stack_stands() -> None:
-    check_stack(10.0)
+    check_stack(4.0)
 
 
 @pytest.mark.long

@@ -27,6 +27,7 @@ from katana450.maths.planning.path import Path, joint_derivatives, point_derivat
 from katana450.maths.planning.plan import MARGIN, check_clear, plan
 from katana450.maths.planning.sampling import collision_free_path
 from katana450.maths.planning.scaling import Bounds
+from tests.conftest import LONG
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +182,7 @@ def test_the_length_of_the_circle_is_that_of_a_circle(
 
 def test_a_plan_to_a_limit_never_exceeds_it_by_rounding(arm: ArmModel, bounds: Bounds) -> None:
     chain = arm.chain
-    for number in range(20):
+    for number in range(20 if LONG else 8):
         start = np.random.default_rng(number).uniform(chain.lower, chain.upper)
         # Vias may exceed a limit by rounding too.
         motion = plan([JointPath(chain, np.array([start, chain.upper + 5e-10]))], bounds)
@@ -192,7 +193,7 @@ def test_a_plan_to_a_limit_never_exceeds_it_by_rounding(arm: ArmModel, bounds: B
 
 def test_a_plan_ends_at_its_goal_to_the_bit(arm: ArmModel, bounds: Bounds) -> None:
     chain, rng = arm.chain, np.random.default_rng(5)
-    for start, goal in rng.uniform(chain.lower, chain.upper, (20, 2, 5)):
+    for start, goal in rng.uniform(chain.lower, chain.upper, (20 if LONG else 8, 2, 5)):
         motion = plan([JointPath(chain, np.array([start, goal]))], bounds)
         np.testing.assert_array_equal(motion.q(0.0), start)
         np.testing.assert_array_equal(motion.q(motion.span), goal)

@@ -33,6 +33,7 @@ from katana450.maths.water.units import (
     counted,
 )
 from katana450.maths.water.vectors import Vector
+from tests.conftest import LONG
 from tests.geometry.strategies import points, repeatable, rotation_vectors
 from tests.water.motions import (
     carried,
@@ -84,7 +85,7 @@ def test_no_motion_makes_or_loses_water(
         water = after
 
 
-@settings(repeatable, max_examples=25)
+@settings(repeatable, max_examples=25 if LONG else 10)
 @given(st.floats(0.5, 6.0), st.floats(0.0, math.pi), st.sampled_from([0.01, 0.05]))
 def test_tilted_cup_keeps_its_capacity_and_the_basin_catches_the_rest(
     flow: WaterFlow, rate: float, final: float, dt: float

@@ -10,7 +10,9 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.driven_tool import DrivenTool
+from katana450.extensions.reachability import reachability as map_module
 from katana450.extensions.reachability.reachability import (
+    POSES,
     PoseSolver,
     Reachability,
     reachability_map,
@@ -21,6 +23,7 @@ from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, joint_frames
+from tests.conftest import LONG
 from tests.general_arms.published_arms import (
     KR_6,
     OPENMANIPULATOR_X,
@@ -118,7 +121,11 @@ def of_three_axes() -> Chain:
     [of_three_axes(), OPENMANIPULATOR_X, SKEWED_6],
     ids=["3 axes", "4 axes", "numerical"],
 )
-def test_other_arms_reach_the_voxels_of_their_postures(chain: Chain) -> None:
+def test_other_arms_reach_the_voxels_of_their_postures(
+    chain: Chain, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not LONG:
+        monkeypatch.setattr(map_module, "SAMPLES", 3 * POSES)
     every = reachability(chain)
     size = every.reach / 7.0
     centers = every.reached(voxel_ranges(every.middle, every.reach, size, DEEP), size)
