@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.arm.control.arm import JointSet
@@ -23,6 +23,7 @@ from katana450.errors import InputError
 from katana450.extensions.bodies.robot_world import robot_world
 from katana450.maths.collision.clearance import DISTANCE_ROUNDING, MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld
+from tests.conftest import LONG
 from tests.robot.hands import column, hand, rail
 from tests.robot.on_the_table import block
 from tests.ticks import during
@@ -45,12 +46,13 @@ class Made(NamedTuple):
 Make = Callable[[str], Made]
 
 
-@pytest.fixture
-def make(tmp_path: Path) -> Make:
+@pytest.fixture(scope="module")
+def make(tmp_path_factory: pytest.TempPathFactory) -> Make:
     """Return a function that makes the session and the world of a robot from its URDF."""
+    path = tmp_path_factory.mktemp("robot") / "robot.urdf"
 
+    @cache
     def made(text: str) -> Made:
-        path = tmp_path / "robot.urdf"
         path.write_text(text)
         robot = load(path)
         world, _, _ = robot_world(robot)
@@ -143,7 +145,7 @@ targets = st.lists(
 )
 
 
-@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=8 if LONG else 4)
 @given(targets)
 def test_no_motion_of_a_hand_brings_its_parts_too_near(
     make: Make, wanted: Sequence[tuple[Sequence[float], float]]

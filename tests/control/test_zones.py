@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import islice
 
 import numpy as np
@@ -17,6 +18,7 @@ from katana450.arm.control.state.scene_objects import SceneObject, Shape, Zone
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.errors import InputError
 from katana450.maths.collision.clearance import MIN_CLEARANCE
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
 from katana450.maths.planning.joint_path import JointPath
 from tests.ticks import TICK, settled, states, until_rest
@@ -108,11 +110,16 @@ def speed_of(session: Session, state: State) -> float:
     return arm.kinematics_to(state.tool).tool_speed(state.setpoint, state.motion.qd)
 
 
+@cache
+def with_zone(session: Session) -> CollisionWorld:
+    """Return the world of the arm with the zone as an obstacle."""
+    assert session.world is not None
+    return session.world.with_obstacles([obstacle_of(SLOW)])
+
+
 def is_inside(session: Session, state: State) -> bool:
     """Return whether a part of the arm overlaps the zone."""
-    world = session.world
-    assert world is not None
-    placed = world.with_obstacles([obstacle_of(SLOW)]).at(state.x_setpoint)
+    placed = with_zone(session).at(state.x_setpoint)
     contacts = [placed.contact(pair) for pair in placed.nearer_than(0.0)[0].tolist()]
     return any("people" in contact.parts and contact.distance < 0.0 for contact in contacts)
 
@@ -138,6 +145,7 @@ def passage(session: Session, command: cmd.Command) -> float:
     return ticks[-1].t - state.t
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "command", [cmd.Joint(1, -1.2), cmd.Joints(LOW - (1.4, 0.0, 0.0, 0.0, 0.0))]
 )
