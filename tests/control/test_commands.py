@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any, get_type_hints
 
 import msgspec
@@ -98,7 +99,8 @@ PLAIN: dict[object, object] = {int: 1, float: 0.1, str: "ball", Finding: Finding
 """Values of fields by their types, for commands whose fields may have any value."""
 
 
-def examples(session: Session, state: State) -> list[cmd.Command]:
+@cache
+def examples(session: Session, state: State) -> tuple[cmd.Command, ...]:
     """Return one command of example class. Only fields with further types need an entry here."""
     arm = session.require_arm()
     q = np.zeros(arm.chain.n)
@@ -113,7 +115,7 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
         *(cmd.OperateArm(ArmAct.UNBLOCK), cmd.Batch((cmd.Home(),)), cmd.RestoreState(state)),
     ]
     kinds: dict[Any, Any] = {type(command): command for command in commands}
-    return [kinds.get(kind) or plain_example(kind) for kind in KINDS]
+    return tuple(kinds.get(kind) or plain_example(kind) for kind in KINDS)
 
 
 def plain_example(kind: Any) -> Any:

@@ -11,25 +11,35 @@ import pytest
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.arm_report import ArmMode, ArmReport
-from katana450.arm.control.state.modes import Mode
+from katana450.arm.control.state.modes import Idle, Mode
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.recording.ticks import Digester
-from tests.control.test_transitions import BEGINNINGS
+from tests.conftest import LONG
+from tests.control.test_transitions import BEGINNINGS, beginnings
 from tests.ticks import TICK, ticked
+
+__all__ = ["beginnings"]
 
 LATER = 4096.0
 """[s] Time of another run at which a state is restored. A sum with it loses few bits."""
 
 
+TICKS = 120 if LONG else 60
+"""Number of ticks after which a run is compared."""
+
+Beginnings = dict[type[Mode], State]
+
+
 @pytest.mark.parametrize("mode", BEGINNINGS)
-def test_restored_state_continues_to_the_bit(shipped: Session, mode: type[Mode]) -> None:
-    rest = shipped.begin(shipped.ready, 0.0, 0.0)
-    state = original = BEGINNINGS[mode](shipped, rest)
-    other = ticked(shipped, rest, cmd.Joint(2, 1.0), ticks=15)
+def test_restored_state_continues_to_the_bit(
+    shipped: Session, beginnings: Beginnings, mode: type[Mode]
+) -> None:
+    state = original = beginnings[mode]
+    other = ticked(shipped, beginnings[Idle], cmd.Joint(2, 1.0), ticks=15)
     fork = replace(other, t=state.t)
     digester = Digester()
-    for number in range(1, 120):
+    for number in range(1, TICKS):
         t = state.t + number * TICK
         commands = [] if number > 1 else [cmd.RestoreState(state)]
         original = shipped.step(original, [], t)
@@ -43,18 +53,19 @@ def test_restored_state_continues_to_the_bit(shipped: Session, mode: type[Mode])
 
 
 @pytest.mark.parametrize("mode", BEGINNINGS)
-def test_times_of_the_state_count_from_the_restoration(shipped: Session, mode: type[Mode]) -> None:
-    rest = shipped.begin(shipped.ready, 0.0, 0.0)
-    state = BEGINNINGS[mode](shipped, rest)
-    original = ticked(shipped, state, ticks=100)
-    fork = ticked(shipped, replace(rest, t=LATER), cmd.RestoreState(state), ticks=100)
+def test_times_of_the_state_count_from_the_restoration(
+    shipped: Session, beginnings: Beginnings, mode: type[Mode]
+) -> None:
+    rest, state = beginnings[Idle], beginnings[mode]
+    original = ticked(shipped, state, ticks=TICKS)
+    fork = ticked(shipped, replace(rest, t=LATER), cmd.RestoreState(state), ticks=TICKS)
     assert fork.t == pytest.approx(LATER + original.t - state.t)
     np.testing.assert_allclose(fork.setpoint, original.setpoint, atol=1e-9)
     assert type(fork.mode) is type(original.mode)
 
 
-def test_stopped_and_real_arms_are_not_set_back(shipped: Session) -> None:
-    rest = shipped.begin(shipped.ready, 0.0, 0.0)
+def test_stopped_and_real_arms_are_not_set_back(shipped: Session, beginnings: Beginnings) -> None:
+    rest = beginnings[Idle]
     moved = ticked(shipped, rest, cmd.Joint(1, 0.5), ticks=200)
     stopped = ticked(shipped, moved, cmd.Stop(), ticks=20)
     report = ArmReport(ArmMode.HOLDING, moved.t, moved.x)
