@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -70,8 +71,10 @@ def before_cup(
     return best
 
 
-def around_cup(session: Session, arm: MountedArm, state: State, offset: float = 0.0) -> State:
+@cache
+def around_cup(session: Session, arm: MountedArm, offset: float = 0.0) -> State:
     """Return the state with the open fingers round the cup, ``offset`` [m] off its middle."""
+    state = session.begin(session.ready, 0.0, 0.0)
     state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
     for back in (BEFORE, AT):
         q = before_cup(session, arm, state, back, offset)
@@ -83,7 +86,7 @@ def around_cup(session: Session, arm: MountedArm, state: State, offset: float = 
 @pytest.fixture(scope="module")
 def holding(session: Session, arm: MountedArm) -> State:
     """The state with the cup between the fingers, on the table."""
-    state = around_cup(session, arm, session.begin(session.ready, 0.0, 0.0))
+    state = around_cup(session, arm)
     return rested(session, state, cmd.Gripper(-0.44))
 
 
@@ -106,6 +109,7 @@ def test_closed_fingers_hold_the_cup_in_place(session: Session, holding: State) 
     assert holding.status.value == "ok"
 
 
+@cache
 def lifted(session: Session, arm: MountedArm, state: State, by: float) -> State:
     """Return the state with the tool ``by`` [m] higher, with the same pitch and roll."""
     chain = arm.chain_to("grasp")
@@ -120,16 +124,16 @@ def lifted(session: Session, arm: MountedArm, state: State, by: float) -> State:
 def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
     session: Session, arm: MountedArm, holding: State
 ) -> None:
-    up = lifted(session, arm, holding, 0.12)
+    up = lifted(session, arm, holding, 0.06)
     _, T = cup_of(session, holding)
     _, T_up = cup_of(session, up)
     # Friction holds it, so it may slip by some hundredths of a millimetre.
     np.testing.assert_allclose(T_up[:3, :3], T[:3, :3], rtol=0, atol=1e-3)
-    np.testing.assert_allclose(T_up[:3, 3] - T[:3, 3], (0.0, 0.0, 0.12), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(T_up[:3, 3] - T[:3, 3], (0.0, 0.0, 0.06), rtol=0, atol=1e-4)
     # A move down by more than the free height: the cup meets the table, not the fingers.
     chain = arm.chain_to("grasp")
     target = ToolTarget.at(chain, up.q)
-    down = rested(session, up, cmd.Position(target.position - [0.0, 0.0, 0.2]))
+    down = rested(session, up, cmd.Position(target.position - [0.0, 0.0, 0.1]))
     (contact,) = (f for f in down.findings if f.reason is Reason.CONTACT)
     assert contact.parts is not None
     assert set(contact.parts) == {"cup", "table"}
@@ -173,10 +177,8 @@ def test_opened_fingers_leave_the_cup_on_the_table(
     np.testing.assert_allclose(away.q, back, rtol=0, atol=1e-9)
 
 
-def test_first_finger_pushes_the_cup_to_the_second(
-    session: Session, state: State, arm: MountedArm
-) -> None:
-    before = around_cup(session, arm, state, 0.008)
+def test_first_finger_pushes_the_cup_to_the_second(session: Session, arm: MountedArm) -> None:
+    before = around_cup(session, arm, 0.008)
     held = rested(session, before, cmd.Gripper(-0.44))
     assert cup_of(session, held)[0].held
     pushed = cup_of(session, held)[1][:3, 3] - cup_of(session, before)[1][:3, 3]
@@ -184,9 +186,9 @@ def test_first_finger_pushes_the_cup_to_the_second(
 
 
 def test_one_finger_stops_at_what_it_cannot_push_and_is_reported(
-    session: Session, state: State, arm: MountedArm
+    session: Session, arm: MountedArm
 ) -> None:
-    state = around_cup(session, arm, state, 0.008)
+    state = around_cup(session, arm, 0.008)
     # In place of the cup a board of 5.6 kg, whose friction on the table is 19 N.
     T = cup_of(session, state)[1]
     R = so3.rotation_z(float(np.arctan2(T[1, 3], T[0, 3])))

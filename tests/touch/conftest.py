@@ -34,7 +34,7 @@ def arm(described: DescribedRobot) -> MountedArm:
 @pytest.fixture(scope="session")
 def around(session: Session, arm: MountedArm) -> State:
     """The state with open fingers around the cup, on the table."""
-    state = around_cup(session, arm, session.begin(session.ready, 0.0, 0.0))
+    state = around_cup(session, arm)
     assert np.isclose(state.gripper, OPEN)
     return state
 

@@ -188,7 +188,7 @@ def test_grip_and_slip_are_identical_to_the_bit_in_a_recording(tmp_path: Path) -
         elif tick == 170:
             yield cmd.Joint(2, state.q[1] - 0.1)
 
-    path = record_session(tmp_path / "slip.mcap", 320, commands)
+    path = record_session(tmp_path / "slip.mcap", 250, commands)
     assert max(state.squeeze for state in states[:160]) > 0.05
     assert states[165].squeeze == pytest.approx(0.01)
     reasons = {finding.reason for state in states for finding in state.findings}
