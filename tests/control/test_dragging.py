@@ -36,7 +36,7 @@ MOVES_PER_TRIP = 25
 """Number of moves in the same direction, so that the drag covers a distance."""
 
 LONG = "KATANA450_LONG" in os.environ
-DRAGS = {Priority.POSE: 10_000 if LONG else 1_000, Priority.PITCH: 1_000, Priority.POSITION: 1_000}
+DRAGS = {Priority.POSE: 10_000 if LONG else 500, Priority.PITCH: 1_000, Priority.POSITION: 1_000}
 """Number of drags for each priority; `make test-long` runs all of POSE."""
 DRAGS_OF_OTHER_ARMS = 500 if LONG else 250
 """Number of drags of each other arm, with the priorities in turn."""

@@ -76,7 +76,9 @@ class Course:
     @property
     def moved(self) -> FloatArray:
         """The movement of the tool point (3,) [m] since the first state."""
-        return np.asarray(self.points()[-1])
+        chain = self.session.require_arm().chain
+        first, last = (forward(chain, self.states[k].setpoint) for k in (0, -1))
+        return np.asarray(last[:3, 3] - first[:3, 3])
 
     def points(self) -> FloatArray:
         """Return the movement of the tool point since the first state (ticks, 3) [m]."""

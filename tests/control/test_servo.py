@@ -15,6 +15,7 @@ from katana450.arm.control.state.modes import Servoing
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
+from tests.conftest import LONG
 
 DT = 0.01
 
@@ -117,7 +118,7 @@ def test_sine_inside_the_limits_keeps_its_amplitude(
     def sine(t: float) -> float:
         return size * math.sin(math.tau * t / period)
 
-    states = arriving(session, sine, 3.0 * period, hz, jitter, rates)
+    states = arriving(session, sine, (3.0 if LONG else 2.0) * period, hz, jitter, rates)
     # The whole time is checked, because it must not overshoot while it catches up either.
     assert max(abs(state.setpoint[0]) for state in states) == pytest.approx(size, rel=5e-3)
     lag, error = lag_and_error(states, sine, period)
@@ -140,11 +141,12 @@ def test_sine_beyond_the_limits_is_clipped_without_overshoot(
 
 def test_chirp_that_becomes_too_fast_is_hardly_overshot(session: Session) -> None:
     """The period falls from 6 s to 1 s; the session cannot know in advance when it is too fast."""
+    seconds = 18.0 if LONG else 14.0
 
     def chirp(t: float) -> float:
-        return 0.3 * math.sin(math.tau * (t / 6.0 + 0.5 * (1.0 - 1.0 / 6.0) * t * t / 18.0))
+        return 0.3 * math.sin(math.tau * (t / 6.0 + 0.5 * (1.0 - 1.0 / 6.0) * t * t / seconds))
 
-    states = arriving(session, chirp, 18.0)
+    states = arriving(session, chirp, seconds)
     assert max(abs(state.setpoint[0]) for state in states) <= 0.3 * 1.01
 
 
@@ -166,7 +168,7 @@ def test_samples_that_arrive_together_make_no_leap(session: Session) -> None:
         return 0.4 * math.sin(math.tau * t / 3.0)
 
     stream, state = on_axis_1(session, sine), session.begin(session.ready, 0.0, 0.0)
-    for tick in range(1, 900):
+    for tick in range(1, 900 if LONG else 500):
         t, commands = tick * DT, []
         if tick % 2 == 0 and tick % 100 > 10:
             commands = [cmd.Servo(stream(t)).timed(t)]
