@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -44,7 +45,8 @@ FILES = {
 }
 
 
-@pytest.fixture
-def urdf(tmp_path: Path) -> Callable[[str], Path]:
+@pytest.fixture(scope="session")
+def urdf(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Return a function that writes a file of FILES and returns its path."""
-    return lambda name: written(tmp_path, name, FILES[name])
+    folder = tmp_path_factory.mktemp("urdf")
+    return cache(lambda name: written(folder, name, FILES[name]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from katana450.maths.kinematics.forward import forward
 from tests.ticks import ticked
 
 
+@cache
 def session_of(chain: Chain) -> Session:
     """Return the session of an arm that starts in its ready posture."""
     arm = ArmModel(chain, {"tcp": chain.M}, "tcp", NO_GRIPPER, to_tool=DrivenTool)

@@ -28,7 +28,7 @@ from tests.general_arms.driven import begun, run, session_of
 from tests.general_arms.programs import played, program
 from tests.general_arms.published_arms import GEN3_7, PANDA, SEVEN, UR5E, XARM_7
 
-ARMS = {**SEVEN, "Gen3": GEN3_7, "xArm7": XARM_7}
+ARMS = {"Gen3": GEN3_7, **SEVEN, "xArm7": XARM_7}
 
 EXACT = 1e-9
 """[m], [1] Measured over turns from 180 random postures of five arms: 9e-15 m and 2e-14."""
@@ -69,7 +69,7 @@ def check_tool_rests(session: Session, states: Sequence[State]) -> None:
         assert arm.chain.within_limits(b.q, slack=0.0)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("chain", ARMS.values(), ids=ARMS)
 def test_elbow_turns_by_an_angle_while_the_tool_rests(chain: Chain) -> None:
     session = session_of(chain)

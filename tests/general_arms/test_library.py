@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ Urdf = Callable[[str], Path]
 NAMES = {"px100": 4, "vx300s": 8, "ur5": 8, "twisted": 1, "seven": 8}
 
 
+@cache
 def load(path: Path, **options: Any) -> katana450.Arm:
     arm: katana450.Arm = katana450.load(path, **options)
     return arm

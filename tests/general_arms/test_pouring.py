@@ -78,8 +78,8 @@ class Pour(NamedTuple):
         return lip
 
 
-def planned(tmp_path: Path, name: str, pour: str) -> Planned:
-    """Return a script that fills the cup of the scene, and pours as the step says."""
+def planned(tmp_path: Path, name: str, pour: str, *later: str) -> Planned:
+    """Return a script that fills the cup of the scene, pours as the step says, and continues."""
     path, setting = tmp_path / "arm.urdf", SETTINGS.get(name, Setting())
     path.write_text(gripping_urdf(name), encoding="utf-8")
     steps = (
@@ -89,8 +89,7 @@ def planned(tmp_path: Path, name: str, pour: str) -> Planned:
         "grasp: cup",
         f"line: {{by: {{z: {setting.lift:g}}}}}",
         f"pour: {pour}",
-        "set_down:",
-        "home",
+        *later,
     )
     script = parse("frame: base\nsteps:\n" + "".join(f"  - {step}\n" for step in steps))
     robot, session, _ = describe_robot(Settings(), path, None)
@@ -100,7 +99,7 @@ def planned(tmp_path: Path, name: str, pour: str) -> Planned:
 
 
 def poured(tmp_path: Path, name: str, pour: str) -> Pour:
-    plan = planned(tmp_path, name, pour)
+    plan = planned(tmp_path, name, pour, "set_down:", "home")
     result = Pour(plan, run_by_clock(plan))
     assert not any(state.findings for state in result.simulation.states)
     return result

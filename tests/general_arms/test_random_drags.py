@@ -21,7 +21,7 @@ from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import near_turns
 from katana450.maths.motion.limiter import JointMotion
-from tests.conftest import MANY_DRAGS
+from tests.conftest import LONG, MANY_DRAGS
 from tests.general_arms.published_arms import FOUR, NEAR_MISS, OFFSET, SEVEN, SIX, SKEWED
 
 ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED, **OFFSET, **NEAR_MISS}
@@ -168,8 +168,9 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
 @pytest.mark.cases(3)
 @pytest.mark.parametrize("name", ["UR5e", "xArm 6", "KR 6", "OpenMANIPULATOR-X", "skewed 6"])
 def test_drags_keep_branch_and_limits(name: str) -> None:
-    dragged = drags(ARMS[name], 20)
-    assert dragged.arrived + dragged.held == 20
+    count = 20 if LONG else 12
+    dragged = drags(ARMS[name], count)
+    assert dragged.arrived + dragged.held == count
     assert dragged.arrived >= 3
     if name != "skewed 6":
         assert dragged.clear >= 2
@@ -178,11 +179,12 @@ def test_drags_keep_branch_and_limits(name: str) -> None:
 @pytest.mark.cases(1)
 @pytest.mark.parametrize("name", SEVEN)
 def test_drags_of_seven_axes_keep_branch_and_limits(name: str) -> None:
-    dragged = drags(ARMS[name], 26)
+    count = 26 if LONG else 12
+    dragged = drags(ARMS[name], count)
     assert dragged.clear >= 2
     assert dragged.beside == 0
     # Free joints do not go on to the middle of their limits while the tool waits beside its place.
-    assert dragged.calls <= 20 * 26
+    assert dragged.calls <= 20 * count
 
 
 @pytest.mark.long
