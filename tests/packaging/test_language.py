@@ -16,22 +16,23 @@ OPENINGS = ("Of", "That", "Those", "Likewise", "What", "Who", "Whoever", "Whose"
 """Words that begin no docstring: the first word is a verb, or a noun that names the thing."""
 
 WORDS = {
-    r"whoever|whomever|wherever": "name the subject: 'a client that ...', 'the person who ...'",
-    r"likewise": "'also', or repeat the verb",
-    r"signs? of life": "'heartbeat'",
-    r"patience": "'timeout'",
-    r"wish(es|ed)?": "'target' or 'request'",
-    r"(is|are|was|were|be|been|gets|being) told": "'is reported', 'is notified'",
-    r"(is|are) said": "'is reported', 'is stated'",
-    r"(go|goes|going|went) on": "'continue'",
-    r"no good": "'invalid'",
-    r"all the same": "'nevertheless', or a sentence of its own",
-    r"nought|naught": "'zero' or 'nothing'",
-    r"none the (less|worse)": "say what happens instead",
-    r"once more|anew": "'again'",
-    r"front page": "'start page'",
+    "whoever|whomever|wherever": "name the subject: 'a client that ...', 'the person who ...'",
+    "likewise": "'also', or repeat the verb",
+    "sign of life|signs of life": "'heartbeat'",
+    "patience": "'timeout'",
+    "wish|wishes|wished": "'target' or 'request'",
+    "is told|are told|was told|were told|be told|been told": "'is reported', 'is notified'",
+    "gets told|being told": "'is reported', 'is notified'",
+    "is said|are said": "'is reported', 'is stated'",
+    "go on|goes on|going on|went on": "'continue'",
+    "no good": "'invalid'",
+    "all the same": "'nevertheless', or a sentence of its own",
+    "nought|naught": "'zero' or 'nothing'",
+    "none the less|none the worse": "say what happens instead",
+    "once more|anew": "'again'",
+    "front page": "'start page'",
 }
-"""Pattern of words to avoid, and what to write instead."""
+"""Words to avoid, and what to write instead."""
 
 OPENING = re.compile(rf'(?:\A|:\n) *[rR]?"""((?:{"|".join(OPENINGS)})[ ,.:\n].*)')
 """A docstring that begins so; ruff checks that each begins beside its quotes."""
@@ -40,6 +41,8 @@ BETWEEN_WORDS = re.compile(r"""(?:\\n|[\s"'#])+(?:f["'])?""")
 """Text between two words in source code: spaces, line ends, and quotes of its parts."""
 
 PATTERN = re.compile("|".join(rf"(?P<w{i}>\b(?:{word})\b)" for i, word in enumerate(WORDS)), re.I)
+
+ALL_WORDS = "|".join(WORDS).split("|")
 
 
 def python_files() -> Iterator[Path]:
@@ -53,7 +56,9 @@ def texts_of(file: Path) -> Iterator[tuple[int, str]]:
     Each with its line. Most files are not parsed, as no such word is in them.
     """
     source = file.read_text(encoding="utf-8")
-    if not PATTERN.search(BETWEEN_WORDS.sub(" ", source)):
+    plain = BETWEEN_WORDS.sub(" ", source).lower()
+    # Ten times as fast as the search for the pattern.
+    if not any(word in plain for word in ALL_WORDS):
         return
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
