@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError
 from tests.robot.public_arms import PX150, urdf
+from tests.robot.xacro_forks import run_forked
 
 PACKAGE = Path(__file__).parent / "xacro" / "printed_arm_description"
 FILE = PACKAGE / "urdf" / "printed_arm.urdf.xacro"
@@ -28,8 +30,10 @@ def templated(folder: Path, *lines: str, name: str = "arm.urdf.xacro") -> Path:
 
 def refusal(path: Path) -> str:
     """Return the message that refuses the file at ``path``."""
-    with pytest.raises(RobotDescriptionError) as raised:
-        read_robot(path)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(subprocess, "run", run_forked)
+        with pytest.raises(RobotDescriptionError) as raised:
+            read_robot(path)
     message = str(raised.value)
     assert not any(word in message for word in LEAKS), message
     return message
