@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import katana450.extensions.programs
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.stopping import HOLD_OFF
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import State
-from katana450.errors import BlockedError, InputError
+from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.continuation import RETURN, Interruption, continued
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.server.page_state import steps_of
-from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.forward import forward
 from tests.programs.conftest import TICK, Stage
 from tests.ticks import rested
 
@@ -39,12 +35,16 @@ steps:
   - arc: {centre: {x: 320, y: 20, z: 130}, axis: y, angle: 40, pitch: 60}
 """
 
-POUR = Path(katana450.extensions.programs.__file__).parent / "library" / "pour.yaml"
-
 
 @pytest.fixture(scope="module")
 def program(stage: Stage) -> Program:
     return stage.planned(SCRIPT)
+
+
+@pytest.fixture(scope="module")
+def whole(stage: Stage, program: Program) -> list[State]:
+    """The states of the program that nobody stops."""
+    return played(stage, program, stage.begin())
 
 
 def stopped_after(
@@ -108,8 +108,9 @@ def after_return(rest: Program, states: list[State]) -> list[State]:
     "ticks",
     [30, 140, *(pytest.param(n, marks=pytest.mark.long) for n in range(10, 420, 17))],
 )
-def test_stopped_program_continues_on_its_path(stage: Stage, program: Program, ticks: int) -> None:
-    whole = played(stage, program, stage.begin())
+def test_stopped_program_continues_on_its_path(
+    stage: Stage, program: Program, whole: list[State], ticks: int
+) -> None:
     run, state = stopped_after(stage, program, min(ticks, len(whole) - 20))
     rest = rest_of(stage, program, run, state)
     states = played(stage, rest, state)
@@ -189,56 +190,3 @@ def test_speed_in_force_applies_to_the_rest(stage: Stage, program: Program) -> N
     rest = rest_of(stage, program, run, state)
     state = replace(state, speed=0.1)
     assert {after.speed for after in played(stage, rest, state)[5:]} == {0.8}
-
-
-@pytest.fixture(scope="module")
-def pour(stage: Stage) -> Program:
-    return stage.planned(POUR.read_text())
-
-
-def cup(state: State) -> int:
-    assert state.poured is not None
-    return state.poured.water.cup.volume
-
-
-def test_stopped_pour_loses_no_drop_and_is_completed(stage: Stage, pour: Program) -> None:
-    carried = next(n for n, task in enumerate(pour.tasks) if task.name == POURING)
-    state, run = stage.begin(), Run(0.0)
-    while run.number < carried:
-        run, state = stage.tick(pour, run, state)
-    full = cup(state)
-    while cup(state) > 0.9 * full:
-        run, state = stage.tick(pour, run, state)
-    run, state = stop(stage, pour, run, state)
-    interruption = interruption_of(pour, run, state)
-    rest = continued(interruption, stage.plan_context, state)
-    states = played(stage, rest, state)
-    assert 0.1 * full < cup(states[0]) < 0.9 * full
-    assert cup(states[-1]) < 0.01 * full
-    last = states[-1].poured
-    assert last is not None
-    assert last.water.basin > 0.99 * full
-    assert not any(scene_object.held for scene_object in states[-1].objects)
-
-
-def test_full_cup_returns_straight_or_not_at_all(stage: Stage, pour: Program) -> None:
-    """The tilt of the cup must stay between those of both ends of the way."""
-    lifted = next(n for n, task in enumerate(pour.tasks) if task.name == POURING)
-    state, run = stage.begin(), Run(0.0)
-    while run.number < lifted or not state.following:
-        run, state = stage.tick(pour, run, state)
-    run, state = stop(stage, pour, run, state)
-    interruption = interruption_of(pour, run, state)
-    aside = rested(stage.session, state, cmd.Joints(state.setpoint + np.array([0.4, 0, 0, 0, 0])))
-    rest = continued(interruption, stage.plan_context, aside)
-    assert any(task.name == RETURN for task in rest.tasks)
-    T = np.eye(4)
-    chain = stage.plan_context.arm.chain_to("tcp")
-    middle = forward(chain, 0.5 * (state.setpoint + aside.setpoint))
-    T[:2, 3] = (stage.plan_context.T_base_shoulder @ middle)[:2, 3]
-    walled = rested(
-        stage.session, aside, cmd.PlaceObject(SceneObject("wall", Shape.BOX, (0.02, 0.02, 0.6), T))
-    )
-    known = replace(interruption, situation=interruption_of(pour, run, walled).situation)
-    with pytest.raises(BlockedError, match="straight back"):
-        continued(known, stage.plan_context, walled)

@@ -2,41 +2,68 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import takewhile
 
 import numpy as np
 import pytest
 
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import State
+from katana450.errors import BlockedError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run.continuation import RETURN, continued
 from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.run.runner import Phase
+from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.script.measures import water_measures
 from katana450.extensions.programs.steps.pouring import POURING
+from katana450.maths.kinematics.forward import forward
 from katana450.maths.water.flow import Water
 from katana450.maths.water.units import MILLILITRE, ML, counted
 from tests.programs.conftest import Stage, pour_text
+from tests.programs.test_continuation import interruption_of, played, rest_of, stop
+from tests.ticks import rested
 
 
 def planned(stage: Stage, **spots: tuple[float, float] | None) -> Program:
     return stage.planned(pour_text(**spots))
 
 
-def check_poured(stage: Stage, program: Program, room: float = 0.0) -> None:
-    """Run the program to its end; check the limits and the water at every tick.
+Course = list[tuple[Run, State]]
+"""The run and the state of each tick."""
 
-    ``room``: angle [deg] that the joints keep from their limits.
-    """
-    run, states = stage.play(program, stage.begin())
+
+@pytest.fixture(scope="module")
+def pour(stage: Stage) -> Program:
+    """The demo, which also the tests of its continuation interrupt."""
+    return planned(stage)
+
+
+@pytest.fixture(scope="module")
+def course(stage: Stage, pour: Program) -> Course:
+    """The demo from its start to its end."""
+    ticks = [(Run(0.0), stage.begin())]
+    while ticks[-1][0].phase is Phase.RUNNING:
+        ticks.append(stage.tick(pour, *ticks[-1]))
+    return ticks
+
+
+def test_all_water_reaches_the_basin_and_none_the_table(
+    stage: Stage, pour: Program, course: Course
+) -> None:
+    """The limits and the water are checked at every tick."""
+    run, states = course[-1][0], [state for _, state in course]
     assert (run.phase, run.why) == (Phase.DONE, "")
     end, pouring = states[-1], stage.session.pouring
-    assert end.t == pytest.approx(program.duration, abs=0.03 * len(program.tasks))
+    assert end.t == pytest.approx(pour.duration, abs=0.03 * len(pour.tasks))
     assert end.poured is not None
     measures = water_measures(end.poured.water, end.poured.course)
     assert 99.5 <= measures["emptied_percent"] <= 100.0
     assert measures["spilled_ml"] == 0.0
     # The water surface stays below the lip until the cup is turned over to pour.
-    (turned,) = (task.action for task in program.tasks if task.name == POURING)
+    (turned,) = (task.action for task in pour.tasks if task.name == POURING)
     assert isinstance(turned, FollowPlan)
     plan = turned.plan
     carried = list(takewhile(lambda s: s.following is None or s.following.plan is not plan, states))
@@ -45,8 +72,9 @@ def check_poured(stage: Stage, program: Program, room: float = 0.0) -> None:
     assert len(margins) > 300
     assert min(margins) > 0.005
     assert stage.loads(states).max() <= 1.0 + 1e-6
+    # The joints keep 2 degrees from their limits.
     chain, q = stage.plan_context.arm.chain, np.array([state.setpoint for state in states])
-    assert np.degrees(np.minimum(q - chain.lower, chain.upper - q)).min() >= room
+    assert np.degrees(np.minimum(q - chain.lower, chain.upper - q)).min() >= 2.0
     (cup,) = (candidate for candidate in end.objects if candidate.name == "cup")
     stood = [t for s in carried for t in s.objects if t.name == "cup" and not t.held][-1]
     assert not cup.held
@@ -54,8 +82,49 @@ def check_poured(stage: Stage, program: Program, room: float = 0.0) -> None:
     np.testing.assert_allclose(cup.T, stood.T, rtol=0, atol=2e-3)
 
 
-def test_all_water_reaches_the_basin_and_none_the_table(stage: Stage) -> None:
-    check_poured(stage, planned(stage), room=2.0)
+def volume_in_cup(state: State) -> int:
+    assert state.poured is not None
+    return state.poured.water.cup.volume
+
+
+def test_stopped_pour_loses_no_drop_and_is_completed(
+    stage: Stage, pour: Program, course: Course
+) -> None:
+    carried = next(n for n, task in enumerate(pour.tasks) if task.name == POURING)
+    poured = [tick for tick in course if tick[0].number >= carried]
+    full = volume_in_cup(poured[0][1])
+    half = next(tick for tick in poured if volume_in_cup(tick[1]) <= 0.5 * full)
+    run, state = stop(stage, pour, *half)
+    states = played(stage, rest_of(stage, pour, run, state), state)
+    assert 0.1 * full < volume_in_cup(states[0]) < 0.9 * full
+    assert volume_in_cup(states[-1]) < 0.01 * full
+    last = states[-1].poured
+    assert last is not None
+    assert last.water.basin > 0.99 * full
+    assert not any(scene_object.held for scene_object in states[-1].objects)
+
+
+def test_full_cup_returns_straight_or_not_at_all(
+    stage: Stage, pour: Program, course: Course
+) -> None:
+    """The tilt of the cup must stay between those of both ends of the way."""
+    lifted = next(n for n, task in enumerate(pour.tasks) if task.name == POURING)
+    first_tick = next(tick for tick in course if tick[0].number >= lifted and tick[1].following)
+    run, state = stop(stage, pour, *first_tick)
+    interruption = interruption_of(pour, run, state)
+    aside = rested(stage.session, state, cmd.Joints(state.setpoint + np.array([0.4, 0, 0, 0, 0])))
+    rest = continued(interruption, stage.plan_context, aside)
+    assert any(task.name == RETURN for task in rest.tasks)
+    T = np.eye(4)
+    chain = stage.plan_context.arm.chain_to("tcp")
+    middle = forward(chain, 0.5 * (state.setpoint + aside.setpoint))
+    T[:2, 3] = (stage.plan_context.T_base_shoulder @ middle)[:2, 3]
+    walled = rested(
+        stage.session, aside, cmd.PlaceObject(SceneObject("wall", Shape.BOX, (0.02, 0.02, 0.6), T))
+    )
+    known = replace(interruption, situation=interruption_of(pour, run, walled).situation)
+    with pytest.raises(BlockedError, match="straight back"):
+        continued(known, stage.plan_context, walled)
 
 
 @pytest.mark.cases(1)
@@ -82,7 +151,7 @@ PART = """\
 frame: base
 steps:
 - fill: {0}
-- grasp: cup
+- grasp: {{object: cup, pitch: 30}}
 - line: {{by: {{z: 140}}}}
 {1}- set_down
 - home
