@@ -11,18 +11,27 @@ from katana450.arm.control.state.state import ActiveStop
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Moment, moments
-from katana450.extensions.programs.script.script_files import library_file, script_text
 from tests.programs.conftest import Stage
+
+CARRY = """\
+frame: base
+steps:
+- fill: 100
+- grasp: {object: cup, pitch: 30}
+- line: {by: {z: 60}}
+- wait: 0.3
+- set_down
+"""
 
 
 @pytest.fixture(scope="module")
-def poured(stage: Stage) -> tuple[Program, list[Moment]]:
-    program = stage.planned(script_text(library_file("pour")))
+def carried(stage: Stage) -> tuple[Program, list[Moment]]:
+    program = stage.planned(CARRY)
     return program, list(moments(program, stage.session, stage.begin()))
 
 
-def test_moments_are_on_the_clock_of_the_program(poured: tuple[Program, list[Moment]]) -> None:
-    program, moments = poured
+def test_moments_are_on_the_clock_of_the_program(carried: tuple[Program, list[Moment]]) -> None:
+    program, moments = carried
     times = [moment.t for moment in moments]
     assert times == sorted(times)
     assert times[-1] == pytest.approx(program.duration)

@@ -19,7 +19,6 @@ from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.extensions.programs.server.page_state import (
     marks,
     planned_steps,
@@ -160,10 +159,20 @@ def test_preview_shows_the_arm_along_the_path_until_the_program_runs(stage: Stag
     assert not stage.shows_ghost()
 
 
+POUR = """\
+frame: base
+steps:
+- fill: 200
+- grasp: {object: cup, pitch: 30}
+- line: {by: {z: 140}}
+- pour: {into: basin, shake: 0}
+"""
+
+
 def test_preview_shows_cup_and_water_at_the_time(server: viser.ViserServer, robot: Robot) -> None:
     session = describe_robot(Settings(), URDF_PATH, None).session
     stage = Stage(server, robot, session)
-    program = stage.compiled(script_text(library_file("pour")))
+    program = stage.compiled(POUR)
     stage.follow(program)
     stage.preview.look(0.1)
     simulated()
@@ -185,7 +194,7 @@ def test_preview_shows_cup_and_water_at_the_time(server: viser.ViserServer, robo
         return cup, water
 
     assert ghosts() == (False, False)
-    carried, emptied = 0.35 * program.duration, 0.6 * program.duration
+    carried, emptied = 0.35 * program.duration, 0.97 * program.duration
     look(2.0)
     # Filled, but still in its place.
     assert ghosts() == (False, True)
