@@ -14,7 +14,7 @@ from katana450.extensions.programs.script.script import parse
 from katana450.maths.planning.checkpoint import checked_by
 from tests.programs.conftest import Stage, pour_text
 
-NEAR = (165.0, 286.0)
+NEAR = (180.0, 315.0)
 """[mm] A place so near the arm that the basin can only be reached at a steep pitch."""
 
 

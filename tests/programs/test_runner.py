@@ -97,19 +97,23 @@ def test_a_pause_stays_on_the_path_and_does_not_count_as_waiting(
 
 
 @pytest.mark.parametrize("cleared", [pytest.param(False, marks=pytest.mark.long), True])
-def test_the_timeout_begins_when_the_path_is_blocked(stage: Stage, cleared: bool) -> None:
+def test_the_timeout_begins_when_the_path_is_blocked(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch, cleared: bool
+) -> None:
+    timeout = 0.1 * ACTION_TIMEOUT
+    monkeypatch.setattr(runner, "ACTION_TIMEOUT", timeout)
     script = parse("steps:\n  - joints: [60, -68, 85, 8, 0]")
-    program = compiled(script, stage.plan_context, stage.begin(), speed=0.03)
+    program = compiled(script, stage.plan_context, stage.begin(), speed=0.15)
     T = np.eye(4)
     T[:2, 3] = 0.5 * np.array((np.cos(0.8), np.sin(0.8)))
     wall = SceneObject("wall", Shape.BOX, (0.1, 0.1, 0.5), T)
     state = stage.session.step(stage.begin(), [cmd.PlaceObject(wall)], 0.01)
     run, stood = Run(state.t), 0.0
-    while stood < 0.9 * ACTION_TIMEOUT:
+    while stood < 0.9 * timeout:
         run, state = stage.tick(program, run, state)
         assert run.phase is Phase.RUNNING
         stood += 0.01 * (state.blocked and state.motion.at_rest)
-    assert run.waited > 2.0 * ACTION_TIMEOUT
+    assert run.waited > 2.0 * timeout
     assert runner.progress(program, run, state).status == "blocked"
     if cleared:
         state = stage.session.step(state, [cmd.Remove("wall")], state.t + 0.01)

@@ -29,7 +29,7 @@ scene:
   - {{name: glass, shape: vessel, size: {size}, pose: {pose}, can_be_held: true}}
 steps:
 - fill: {full}
-- grasp: cup
+- grasp: {grasp}
 - line: {{by: {{z: 140}}}}
 {steps}
 """
@@ -48,7 +48,9 @@ BOTH = """\
 
 def started(stage: Stage, steps: str, **values: object) -> tuple[Program, State]:
     text = SCENE.format(
-        **{"size": [30, 80], "pose": [420, 40, 0, 0, 0, 0], "full": 200, "steps": steps} | values
+        **{"size": [30, 80], "pose": [420, 40, 0, 0, 0, 0], "full": 200, "grasp": "cup"}
+        | {"steps": steps}
+        | values
     )
     script = parse(text)
     assert script.scene is not None
@@ -96,8 +98,7 @@ def test_half_of_the_cup_is_poured_into_a_glass_and_all_into_the_basin(stage: St
 def test_nothing_is_spilled_beside_a_glass(
     stage: Stage, full: int, pour: str, size: list[int], pose: list[int]
 ) -> None:
-    steps = f"- pour: {pour}\n- set_down\n"
-    program, start = started(stage, steps, full=full, size=size, pose=pose)
+    program, start = started(stage, f"- pour: {pour}\n", full=full, size=size, pose=pose)
     run, states = stage.play(program, start, most=20_000)
     assert (run.phase, run.why) == (Phase.DONE, "")
     assert states[-1].poured is not None
@@ -123,7 +124,7 @@ def test_nothing_is_spilled_beside_a_glass(
 )
 def test_impossible_pour_is_refused(stage: Stage, steps: str, said: str) -> None:
     with pytest.raises(ScriptError, match=said):
-        started(stage, steps)
+        started(stage, steps, grasp="{object: cup, pitch: 30}")
 
 
 def glass(number: int) -> SceneObject:
