@@ -27,11 +27,14 @@ from tests.programs.conftest import TICK, Stage
 NEAR, AT = (240.0, 90.0), (230.0, -120.0)
 """[mm] Places on the table that the arm reaches from above."""
 
+LOW = (40.0, 40.0, 60.0)
+"""[mm] Size of a box in whose middle the hand from above has no room."""
+
 
 def box(
     name: str,
     xy: tuple[float, float],
-    size: tuple[float, ...] = (40.0, 40.0, 60.0),
+    size: tuple[float, ...] = (40.0, 40.0, 80.0),
     *,
     yaw: float = 0.0,
     shape: Shape = Shape.BOX,
@@ -88,7 +91,8 @@ def test_stacked_object_is_grasped_so_that_it_can_be_placed(stage: Stage) -> Non
 def test_plan_knows_where_it_puts_an_object(stage: Stage) -> None:
     """A later step stacks another object there."""
     plan = PlanState(
-        stage.plan_context, replace(stage.begin(), objects=(box("b", NEAR),), poured=None)
+        stage.plan_context,
+        replace(stage.begin(), objects=(box("b", NEAR, LOW),), poured=None),
     )
     (b,) = (
         PlaceHeld(Spot(*(1e-3 * length for length in AT)), in_base=True)
@@ -100,12 +104,27 @@ def test_plan_knows_where_it_puts_an_object(stage: Stage) -> None:
 
 def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
     steps = "- pick: b\n- line: {by: {z: -53}}\n- release\n- home\n"
-    end = played(stage, steps, box("b", NEAR))
+    end = played(stage, steps, box("b", NEAR, LOW))
     # Its contact with the table gives way by some micrometres.
     assert place(end["b"]) == pytest.approx([*NEAR, 0.0], abs=0.05)
 
 
-@pytest.mark.cases(4)
+OBJECTS = (
+    box("part", NEAR, yaw=60.0),
+    box("low", (170.0, 190.0), (40.0, 40.0, 10.0)),
+    box("far", (550.0, -100.0)),
+    replace(box("basin", (60.0, -200.0), (60.0, 70.0), shape=Shape.CYLINDER), can_be_held=False),
+    replace(box("ball", (100.0, -250.0), (20.0,), shape=Shape.SPHERE), can_be_held=False),
+)
+
+
+@pytest.fixture(scope="module")
+def holding(stage: Stage) -> State:
+    """The hand holds `part` over its place."""
+    program, start = planned(stage, "- pick: part\n", *OBJECTS)
+    return stage.play(program, start)[1][-1]
+
+
 @pytest.mark.parametrize(
     ("steps", "message"),
     [
@@ -114,45 +133,45 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
         ("- pick: far\n", r"far cannot be grasped at its place: The tool grasp cannot be at"),
         ("- place: {at: {x: 230, y: -120}}\n", "The hand holds nothing to place. `pick` an object"),
         ("- release\n", "The hand holds nothing to release"),
-        ("- pick: part\n- pick: low\n", "already holds an object"),
-        ("- pick: part\n- stack: {object: low, on: far}\n", "already holds an object"),
-        ("- pick: part\n- release\n", "part would fall 60 mm"),
-        ("- pick: part\n- gripper: open\n", "part would fall 60 mm. Lower it to at most 10 mm"),
+        ("- pick: {object: part, side: front}\n", "its sides are turned too far, seen from"),
         # The pitch of the grasp has nothing to do with it.
         (
             "- pick: part\n- place: {at: {x: 230, y: 720}}\n",
             "nothing carries it there.*choose a place on it.$",
         ),
-        (
-            "- pick: part\n- place: {at: {x: 100, y: -40}}\n",
-            r"placed there: The path .* at \(100.0, -40.0, \d+.\d\) mm in the base frame",
-        ),
-        ("- pick: part\n- place: {on: basin}\n", "basin is open at its top and cannot carry part"),
-        (
-            "- pick: part\n- place: {at: {x: 60, y: -200}}\n",
-            "basin is open at its top and cannot carry part",
-        ),
-        ("- pick: part\n- place: {at: {x: 230, y: -120, z: 30}}\n", "put it 30.0 mm lower"),
-        ("- pick: part\n- place: {on: ball}\n", "ball cannot carry part"),
-        ("- pick: part\n- place: {on: far, at: {x: 230, y: -120}}\n", "far cannot carry part"),
-        ("- pick: part\n- place: {at: {x: 180, y: 150}}\n", "cannot be placed there: .*low"),
-        ("- pick: {object: part, side: front}\n", "its sides are turned too far, seen from"),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_its_reason(
     stage: Stage, steps: str, message: str
 ) -> None:
-    objects = (
-        box("part", NEAR, yaw=60.0),
-        box("low", (170.0, 190.0), (40.0, 40.0, 10.0)),
-        box("far", (550.0, -100.0)),
-        replace(
-            box("basin", (60.0, -200.0), (60.0, 70.0), shape=Shape.CYLINDER), can_be_held=False
-        ),
-        replace(box("ball", (100.0, -250.0), (20.0,), shape=Shape.SPHERE), can_be_held=False),
-    )
     with pytest.raises(InputError, match=message):
-        planned(stage, steps, *objects)
+        planned(stage, steps, *OBJECTS)
+
+
+@pytest.mark.parametrize(
+    ("steps", "message"),
+    [
+        ("- pick: low\n", "already holds an object"),
+        ("- stack: {object: low, on: far}\n", "already holds an object"),
+        ("- release\n", "part would fall 60 mm"),
+        ("- gripper: open\n", "part would fall 60 mm. Lower it to at most 10 mm"),
+        (
+            "- place: {at: {x: 100, y: -40}}\n",
+            r"placed there: The path .* at \(99.9, -39.8, \d+.\d\) mm in the base frame",
+        ),
+        ("- place: {on: basin}\n", "basin is open at its top and cannot carry part"),
+        ("- place: {at: {x: 60, y: -200}}\n", "basin is open at its top and cannot carry part"),
+        ("- place: {at: {x: 230, y: -120, z: 30}}\n", "put it 30.0 mm lower"),
+        ("- place: {on: ball}\n", "ball cannot carry part"),
+        ("- place: {on: far, at: {x: 230, y: -120}}\n", "far cannot carry part"),
+        ("- place: {at: {x: 180, y: 150}}\n", "cannot be placed there: .*low"),
+    ],
+)
+def test_what_cannot_be_done_with_a_held_object_is_refused(
+    stage: Stage, holding: State, steps: str, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        stage.planned(f"frame: base\nsteps:\n{steps}", holding)
 
 
 def test_fingers_without_room_to_open_are_refused(stage: Stage) -> None:
@@ -237,7 +256,7 @@ def test_run_fails_if_the_fingers_close_on_nothing(stage: Stage, checked: bool) 
 
 
 def test_object_held_from_the_front_is_not_turned(stage: Stage) -> None:
-    steps = "- pick: {object: part, side: front}\n- place: {at: {x: 300, y: -120, yaw: 45}}\n"
+    steps = "- pick: {object: part, pitch: 65}\n- place: {at: {x: 300, y: -120, yaw: 45}}\n"
     with pytest.raises(ScriptError, match=r"its yaw would be .* Pick it with `side: above`"):
         planned(stage, steps, box("part", (320.0, 0.0)))
 
