@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,6 +97,7 @@ class BodyMotion:
         return np.asarray(self.rest_time >= REST_TIME)
 
 
+@lru_cache(maxsize=256)
 def volume(shape: CollisionShape) -> float:
     """Return the volume of a shape [m^3]."""
     geometry = shape.geometry

@@ -241,9 +241,7 @@ class BodySimulation:
         rest_time = np.where(waits, motion.rest_time, rest_time)
         memory = data.qacc_warmstart.copy()
         contacts = () if lost else self._contacts()
-        fingers = (
-            self._fingers(towards, is_touching=bool(contacts)) if not lost else np.empty((0, 2))
-        )
+        fingers = np.empty((0, 2)) if lost else self._fingers(towards, is_touching=bool(contacts))
         return BodyMotion(
             motion.names,
             frozen(place),
