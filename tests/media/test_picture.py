@@ -91,6 +91,7 @@ def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Pixels)
     assert png(again) == png(filled)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("pose", POSES)
 def test_the_arm_covers_the_same_pixels_as_in_pillow(
     workshop: Workshop, katana: Robot, pose: tuple[float, ...]

@@ -39,20 +39,28 @@ def run() -> tuple[Planned, Report]:
     return reported(TEXT)
 
 
-def test_table_has_the_water_once_there_is_some(run: tuple[Planned, Report]) -> None:
+@pytest.fixture(scope="module")
+def dry() -> tuple[Planned, Report]:
+    """A run without water, of an arm that follows exactly."""
+    return reported("steps: [nudge: {axis: 5, by: 7}]")
+
+
+def test_table_has_the_water_once_there_is_some(
+    run: tuple[Planned, Report], dry: tuple[Planned, Report]
+) -> None:
     rows = list(csv.DictReader(io.StringIO(run[1].csv())))
     assert set(rows[0]) > WATER
     assert float(rows[-1]["cup_ml"]) == pytest.approx(100.0)
     assert float(rows[-1]["basin_ml"]) == 0.0
     assert float(rows[-1]["cup_tilt_deg"]) == pytest.approx(0.0, abs=1e-6)
     assert float(rows[-1]["lip_above_water_mm"]) > 1.0
-    without = list(
-        csv.DictReader(io.StringIO(reported("steps: [nudge: {axis: 5, by: 7}]")[1].csv()))
-    )
+    without = list(csv.DictReader(io.StringIO(dry[1].csv())))
     assert not WATER & set(without[0])
 
 
-def test_measured_arm_is_apart_from_its_setpoints(tmp_path: Path) -> None:
+def test_measured_arm_is_apart_from_its_setpoints(
+    tmp_path: Path, dry: tuple[Planned, Report]
+) -> None:
     plan = plan_script(parse("frame: base\nsteps: [line: {by: {y: 60}}]"), URDF_PATH)
     arm, start = plan.robot.require_arm(), plan.start
     offset = np.array((0.003, 0.0, 0.0, 0.0, 0.0))
@@ -80,7 +88,7 @@ def test_measured_arm_is_apart_from_its_setpoints(tmp_path: Path) -> None:
     figures = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert figures["tracking_lag_ms"] == pytest.approx(100.0, abs=3.0)
     assert figures["measured"] == "a test"
-    exact = reported("steps: [nudge: {axis: 5, by: 7}]")[1].write(tmp_path / "exact", WRITTEN)
+    exact = dry[1].write(tmp_path / "exact", WRITTEN)
     assert "measured.png" not in {path.name for path in exact}
 
 
