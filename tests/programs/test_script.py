@@ -12,6 +12,7 @@ from katana450.extensions.programs.language.scope import StepTarget
 from katana450.extensions.programs.language.source import MAX_BYTES, MAX_DEPTH, Problem, ScriptError
 from katana450.extensions.programs.script.script import MAX_STEPS, parse
 from katana450.extensions.programs.steps.moves import Circle, Line, Move
+from tests.conftest import LONG
 
 GOOD = """\
 name: Try
@@ -164,7 +165,7 @@ def wrong_with(text: str) -> tuple[Problem, ...]:
     return () if script.steps else (Problem(0, 0, "no steps"),)
 
 
-@settings(max_examples=80)
+@settings(max_examples=80 if LONG else 30)
 @given(st.text(max_size=200) | st.text("steps:-[]{},&*!|>'\"# \n\t12xyhome", max_size=80))
 @example("steps: *a")
 @example("? - [\n")
