@@ -45,10 +45,10 @@ KINDS = {
     "tests/real_arm/test_session_with_driver.py": SERVERS[1],
     "tests/real_arm/test_emulator_process.py": SERVERS[0],
     "tests/recording/test_attached_scripts.py": SERVERS[1],
-    "tests/recording/test_episodes_on_a_server.py": SERVERS[1],
-    "tests/recording/test_recording_jobs.py": BROWSER,
+    "tests/recording/test_episodes_on_a_server.py": SERVERS[0],
+    "tests/recording/test_recording_jobs.py": SERVERS[1],
     "tests/recording/test_recorder.py": SERVERS[0],
-    "tests/recording/test_run_again_on_a_server.py": SERVERS[0],
+    "tests/recording/test_run_again_on_a_server.py": SERVERS[1],
     "tests/rosbridge": SERVERS[1],
     # The most tests come first, so a file of many takes the single test of the types along.
     "tests/control/test_transitions.py": EARLY,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.episodes import running_episode
+from tests.browser.server import RECORDING_APP, AppServer
 from tests.recording.episode_bench import Bench
 from tests.recording.recorded import record
 
@@ -29,6 +31,32 @@ def run(recorded_run: tuple[Path, list[TickRecord]]) -> Path:
 def records(recorded_run: tuple[Path, list[TickRecord]]) -> list[TickRecord]:
     """Return the records of that session."""
     return recorded_run[1]
+
+
+@pytest.fixture(scope="session")
+def server_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the shared server: its ring, its episodes and temporary files."""
+    return tmp_path_factory.mktemp("server")
+
+
+@pytest.fixture(scope="session")
+def shared_server(server_folder: Path) -> Iterator[AppServer]:
+    """Return a server for several modules, which begin with what those before them recorded.
+
+    Its start takes 2 s of processor time, and recording begins 5 s later.
+    """
+    temporary = server_folder / "temporary"
+    temporary.mkdir()
+    places = (
+        "--record",
+        str(server_folder / "ring"),
+        "--episodes",
+        str(server_folder / "episodes"),
+    )
+    # A busy machine delays the heartbeats of its processes, for which the arm would pause.
+    command = (*RECORDING_APP, "--silence", "2.0", *places)
+    with AppServer(command, environment={**os.environ, "TMPDIR": str(temporary)}) as running:
+        yield running
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +29,7 @@ from katana450.extensions.recording.live.running_scripts import (
     ScriptNote,
 )
 from katana450.extensions.recording.playback.run import PlaybackRun
-from tests.browser.server import RECORDING_APP, AppServer
+from tests.browser.server import AppServer
 from tests.recording.recorded import header, run, swinging
 from tests.waiting import until
 
@@ -47,15 +46,8 @@ def scripts_of(path: Path) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("scripts")
-
-
-@pytest.fixture(scope="module")
-def server(folder: Path) -> Iterator[AppServer]:
-    places = ("--record", str(folder / "ring"), "--episodes", str(folder / "episodes"))
-    with AppServer((*RECORDING_APP, "--silence", "2.0", *places)) as running:
-        yield running
+def folder(server_folder: Path) -> Path:
+    return server_folder
 
 
 def kept(folder: Path, *options: str) -> Path:
@@ -69,14 +61,14 @@ LEFT, RIGHT = (TURN.format(name=f"Turn {angle}", angle=angle) for angle in (20, 
 
 
 @pytest.fixture(scope="module")
-def ran(server: AppServer, folder: Path) -> tuple[Path, Path]:
+def ran(shared_server: AppServer, folder: Path) -> tuple[Path, Path]:
     """Return a recording of four runs of three scripts, and the file of an episode of one."""
     named = folder / "nod.yaml"
     named.write_text(NOD, encoding="utf-8")
-    with katana450.connect(server.url, name="Ada") as client:
+    with katana450.connect(shared_server.url, name="Ada") as client:
         client.run(LEFT)
         client.episodes.start("nod")
-        assert main(["run", str(named), "--url", server.url]) == 0
+        assert main(["run", str(named), "--url", shared_server.url]) == 0
         episode = client.episodes.stop("success")
         for text in (LEFT, RIGHT):
             client.run(text)
@@ -86,6 +78,7 @@ def ran(server: AppServer, folder: Path) -> tuple[Path, Path]:
             return [run.end is None for run in script_runs([file])] == [False] * 4
         return False
 
+    until(lambda: recordings_in(folder / "ring"))
     until(has_all)
     path = kept(folder).rename(folder / "all.mcap")
     return path, folder / "episodes" / f"episode-{episode:04d}.mcap"

@@ -67,16 +67,23 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "ring"
 
 
-@pytest.fixture
-def server(folder: Path) -> Iterator[AppServer]:
+@pytest.fixture(scope="module")
+def server_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("server") / "ring"
+
+
+@pytest.fixture(scope="module")
+def server(server_folder: Path) -> Iterator[AppServer]:
+    """Return a server for two tests, the second of which kills the process that records."""
     # A busy machine delays the heartbeats of its processes, for which the arm would pause.
-    with AppServer((*RECORDING_APP, "--silence", "2.0", "--record", str(folder))) as running:
+    with AppServer((*RECORDING_APP, "--silence", "2.0", "--record", str(server_folder))) as running:
         yield running
 
 
 def test_motion_is_recorded_and_simulated_again_to_the_bit(
-    server: AppServer, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    server: AppServer, server_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    folder = server_folder
     assert str(folder) in server.output
     if sys.platform != "win32":
         niceness = [os.getpriority(os.PRIO_PROCESS, pid) for pid in _pids(server)]
@@ -97,12 +104,10 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
             assert answer[0] == status, answer[2]
     downloaded = tmp_path / "downloaded.mcap"
     downloaded.write_bytes(answer[2])
-    assert verified(downloaded) == verified(copy)
-    server.stop()
-    assert verified(copy) > 100
+    assert tick_times(downloaded) == tick_times(copy)
+    assert verified(downloaded) > 100
     (path,) = recordings_in(folder)
-    assert verified(path) > 100
-    recording = katana450.open(path)
+    recording = katana450.open(copy)
     assert np.abs(recording.q - state.q).max(axis=1).min() < 1e-9
     # It begins with the first motion, although the process started later.
     assert recording.t[-1] - recording.t[0] > 1.0
@@ -146,10 +151,11 @@ def _keeps(folder: Path, copy: Path, command: str) -> bool:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
 def test_killed_recorder_loses_a_second_and_the_arm_nothing(
-    server: AppServer, folder: Path
+    server: AppServer, server_folder: Path
 ) -> None:
-    chance = random.Random(450)
+    chance, folder = random.Random(450), server_folder
     with katana450.connect(server.url, name="test") as client:
+        client.clear_stop()
         client.joints(POSTURES[1])
         until(lambda: recordings_in(folder))
         for kill in range(KILLS):

@@ -9,7 +9,6 @@ import re
 import signal
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from katana450.cli.main import main
 from katana450.extensions import progress
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import MessageWriter
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.messages import COMMANDS
 from katana450.extensions.recording.playback.store import PREFIX, RecordingStore
@@ -37,25 +37,23 @@ POSTURES = ((0.3, -1.0, 1.4, 0.3, 0.0), (-0.3, -1.0, 1.4, 0.3, 0.5))
 
 
 @pytest.fixture(scope="module")
-def temporary(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def temporary(server_folder: Path) -> Path:
     """Return the folder for temporary files of the server."""
-    return tmp_path_factory.mktemp("temporary")
+    return server_folder / "temporary"
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory, temporary: Path) -> Iterator[AppServer]:
+def server(shared_server: AppServer, server_folder: Path) -> AppServer:
     """Return a server that has recorded two motions."""
-    folder = tmp_path_factory.mktemp("ring")
-    command = (*RECORDING_APP, "--record", str(folder))
-    environment = {**os.environ, "TMPDIR": str(temporary)}
-    with AppServer(command, environment=environment) as running:
-        with katana450.connect(running.url, name="Ada") as client:
-            for posture in POSTURES:
-                client.joints(posture)
-        cookie = enter(running.url)
-        until(lambda: ask(f"{running.url}/api/v1/recording", Cookie=cookie)[0] == 200)
-        time.sleep(1.0)
-        yield running
+    with katana450.connect(shared_server.url, name="Ada") as client:
+        for posture in POSTURES:
+            client.joints(posture)
+    # Each request for a recording starts a process.
+    until(lambda: recordings_in(server_folder / "ring"))
+    time.sleep(1.0)
+    cookie = enter(shared_server.url)
+    until(lambda: ask(f"{shared_server.url}/api/v1/recording", Cookie=cookie)[0] == 200)
+    return shared_server
 
 
 class Page:

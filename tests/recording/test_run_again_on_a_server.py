@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from argparse import Namespace
-from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
@@ -18,6 +18,7 @@ from katana450.arm.control.lease import Role
 from katana450.cli.main import main
 from katana450.client import RefusedError
 from katana450.extensions.programs.script.script import parse
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.playback.store import RecordingStore
 from katana450.extensions.recording.run_again import check_same_arm
@@ -25,7 +26,7 @@ from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
-from tests.browser.server import RECORDING_APP, AppServer
+from tests.browser.server import AppServer
 from tests.gateway.client import ask, enter
 from tests.recording.recorded import described
 from tests.waiting import until
@@ -34,17 +35,12 @@ TARGETS = ((0.33, 0.05, 0.08), (0.28, -0.04, 0.03), (0.3, 0.0, 0.06))
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AppServer]:
-    folder = tmp_path_factory.mktemp("ring")
-    with AppServer((*RECORDING_APP, "--silence", "2.0", "--record", str(folder))) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def recorded(server: AppServer, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recorded(
+    shared_server: AppServer, server_folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     """A drag through TARGETS, as the server has recorded it."""
     path = tmp_path_factory.mktemp("kept") / "drag.mcap"
-    with katana450.connect(server.url, "Ada") as client:
+    with katana450.connect(shared_server.url, "Ada") as client:
         for target in TARGETS:
             client.go(requests.Position(p=np.array(target)))
         end = client.query(answers.State).q
@@ -56,24 +52,27 @@ def recorded(server: AppServer, tmp_path_factory: pytest.TempPathFactory) -> Pat
                 return False
             return bool(np.abs(katana450.open(path).setpoint[-1] - end).max() < 1e-9)
 
+        # Each request for a recording starts a process, and a second later it is complete.
+        until(lambda: recordings_in(server_folder / "ring"))
+        time.sleep(1.0)
         until(kept, 60.0)
     return path
 
 
 @pytest.mark.long
 def test_recorded_drag_runs_again(
-    server: AppServer, recorded: Path, capsys: pytest.CaptureFixture[str]
+    shared_server: AppServer, recorded: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["record", "again", str(recorded), "--url", server.url]) == 0
+    assert main(["record", "again", str(recorded), "--url", shared_server.url]) == 0
     printed = capsys.readouterr().out
     assert "Again drag.mcap: " in printed
-    with katana450.connect(server.url, "Ada") as client:
+    with katana450.connect(shared_server.url, "Ada") as client:
         end = client.query(answers.State).q
     assert np.abs(katana450.open(recorded).setpoint[-1] - end).max() < 1e-6
 
 
-def test_script_of_the_last_seconds_is_served(server: AppServer, recorded: Path) -> None:
-    address, cookie = f"{server.url}/api/v1/recording/script", enter(server.url)
+def test_script_of_the_last_seconds_is_served(shared_server: AppServer, recorded: Path) -> None:
+    address, cookie = f"{shared_server.url}/api/v1/recording/script", enter(shared_server.url)
     for query, status in (("?from=-1", 400), ("?to=x", 400), ("?from=9e9", 409), ("", 200)):
         answer = ask(address + query, Cookie=cookie)
         assert answer[0] == status, answer[2]
@@ -97,8 +96,8 @@ def test_script_is_made_for_the_robot_of_the_server_only(recorded: Path, tmp_pat
 
 
 @pytest.mark.long
-def test_server_with_another_arm_is_refused(server: AppServer, recorded: Path) -> None:
-    with katana450.connect(server.url, "Ada") as client:
+def test_server_with_another_arm_is_refused(shared_server: AppServer, recorded: Path) -> None:
+    with katana450.connect(shared_server.url, "Ada") as client:
         arm = client.query(answers.Arm)
         other = msgspec.structs.replace(arm, upper=[angle + 0.1 for angle in arm.upper])
 
