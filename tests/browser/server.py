@@ -102,6 +102,11 @@ class AppServer:
         return self._process is not None and self._process.poll() is None
 
     @property
+    def status(self) -> int | None:
+        """Exit status of the process that ended last, until `stop`; None while it runs."""
+        return None if self._process is None else self._process.poll()
+
+    @property
     def pid(self) -> int:
         """Id of the process. Raises ServerError if it does not run."""
         if self._process is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
@@ -16,6 +17,7 @@ import pytest
 from katana450.cli.main import main
 from tests.browser.server import AppServer, ServerError, free_port
 from tests.commands import completed
+from tests.waiting import until
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -94,25 +96,16 @@ def test_invalid_address_is_reported(options: tuple[str, ...], message: str) -> 
 @pytest.mark.parametrize(
     "number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM]
 )
-def test_viewer_stops_on_request(number: signal.Signals) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "katana450", "serve", "--port", str(free_port())],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        cwd=ROOT,
-    )
-    assert process.stdout is not None
-    for line in process.stdout:
-        if "is ready" in line:
-            break
-    started = time.monotonic()
-    process.send_signal(number)
-    output = process.communicate(timeout=20)[0]
-    assert process.returncode == 0, output
-    assert time.monotonic() - started < 5.0
+def test_viewer_stops_on_request(server: AppServer, number: signal.Signals) -> None:
+    if not server.running:
+        server.start()
+    printed = server.output
+    os.kill(server.pid, number)
+    until(lambda: not server.running, 5.0)
+    assert server.status == 0, server.output
+    server.stop()
     # Neither the program nor a library prints anything after the interrupt.
-    assert output == ""
+    assert server.output == printed
 
 
 def test_the_command_prints_its_version_and_its_commands(

@@ -32,12 +32,12 @@ from katana450.extensions.recording.episodes.episode_folder import (
 )
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
-from katana450.extensions.recording.files.simulation import session_for, verify_recording
+from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.extensions.recording.live import ring as ring_module
 from katana450.extensions.recording.messages import COMMANDS, EPISODES, STATE
 from katana450.server.api.episode_requests import episode_request
 from tests.recording.episode_bench import ADA, Bench, motion
-from tests.recording.recorded import header
+from tests.recording.recorded import described, header
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def test_episode_is_cut_out_of_a_recording(recorded: Path, tmp_path: Path) -> No
     assert opened.t[0] >= episode.start
     with RecordingFile.open(path) as file:
         assert file.counts()[STATE] > 50
-        assert verify_recording(file, session_for(file).session).identical
+        assert verify_recording(file, described().session).identical
 
 
 def test_description_is_appended_without_changing_the_rest(recorded: Path, tmp_path: Path) -> None:
@@ -88,7 +88,7 @@ def test_description_is_appended_without_changing_the_rest(recorded: Path, tmp_p
             assert only_episode(file) == after
     with RecordingFile.open(path) as file:
         assert file.counts()[EPISODES] == 4
-        assert verify_recording(file, session_for(file).session).identical
+        assert verify_recording(file, described().session).identical
         # The data before is the same, byte for byte.
         assert path.read_bytes()[: len(content) // 2] == content[: len(content) // 2]
     with path.open("rb") as stream:
@@ -213,7 +213,7 @@ def test_episode_longer_than_the_ring_is_whole(
     bench.ask(do="stop")
     (entry,) = bench.folder.kept()
     with RecordingFile.open(entry.path) as file:
-        assert verify_recording(file, session_for(file).session).ticks >= 159
+        assert verify_recording(file, described().session).ticks >= 159
         assert next(iter(file.messages(STATE))).t == pytest.approx(first, abs=0.2)
     # The next file of the ring removes what is not needed any more.
     for _ in range(3):

@@ -22,7 +22,7 @@ from tests.conftest import LONG
 from tests.recording.recorded import described, fresh, record
 from tests.recording.sessions import drag, program, record_session
 
-FORKS = 60 if LONG else 8
+FORKS = 60 if LONG else 5
 SECONDS = 5.0 if LONG else 0.5
 """[s] Time for which a continuation is compared with the recording."""
 
@@ -38,7 +38,7 @@ steps:
 
 
 def random_session(path: Path) -> Path:
-    record(path, 3000 if LONG else 600)
+    record(path, 3000 if LONG else 400)
     return path
 
 

@@ -195,13 +195,14 @@ def _has_newer(folder: Path, before: Path) -> bool:
 
 def test_ring_keeps_the_newest_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ring, "MAX_FILE_TICKS", 10)
+    monkeypatch.setattr(ring, "MAX_FILES", 5)
     store = Ring(folder, header())
 
     def put(record: TickRecord) -> None:
         store.put(record)
         store.sync()
 
-    run(400, 5, put)
+    run(150, 5, put)
     store.close()
     files = recordings_in(folder)
     assert len(files) == ring.MAX_FILES
@@ -306,7 +307,7 @@ def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyP
     end.attach(ours)
     began = time.monotonic()
     # More than the pipe and the list hold, while nobody reads.
-    run(2000, 7, take)
+    run(1000, 7, take)
     assert time.monotonic() - began < 60.0
     end.close()
     deserializer, received, lost = RecordDeserializer(), list[TickRecord](), 0

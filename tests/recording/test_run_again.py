@@ -144,7 +144,7 @@ def test_grasp_and_carried_object_are_repeated(tmp_path: Path) -> None:
         states.append(state)
         return script(tick, state)
 
-    path = record_session(tmp_path / "grasp.mcap", 1500, commands)
+    path = record_session(tmp_path / "grasp.mcap", 900, commands)
     part, text = read(path)
     assert "gripper: {to: closed, holding: cup}" in text
     simulation = run_by_clock(planned(text))

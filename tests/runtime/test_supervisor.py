@@ -98,7 +98,10 @@ class Running:
         self.supervisor.stop()
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+# Processes that hang are ended in the next test too.
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.long)]
+)
 def test_lost_process_starts_again_with_its_state(tmp_path: Path, number: signal.Signals) -> None:
     running = Running(
         ChildSpec("worker", "The worker", partial(worker, tmp_path), 1.0, keeps=True),
