@@ -256,7 +256,7 @@ export class Joints {
   // Whether a drag of this person would be accepted if the arm is not stopped.
   #mayDrive() {
     const status = this.#page.store.live;
-    return Boolean(status && status.role !== "viewer" && (status.mine || status.holder === null));
+    return Boolean(status && status.role !== "viewer" && (status.mine || status.own_program || status.holder === null));
   }
 
   // The description of the arm, which is there when a joint is under the pointer.

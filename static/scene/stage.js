@@ -62,7 +62,7 @@ export class Stage {
       // While the arm is stopped, a new drag is refused with the reason.
       const stops = status.stopped && !stopped;
       stopped = Boolean(status.stopped);
-      if (stops || (!status.mine && status.holder !== null)) this.drop();
+      if (stops || !(status.mine || status.own_program || status.holder === null)) this.drop();
     });
     document.addEventListener("visibilitychange", () => document.hidden && this.joints.lose());
     window.addEventListener("blur", () => this.#blur());

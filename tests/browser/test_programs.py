@@ -11,10 +11,12 @@ import pytest
 from katana450.client import Client, connect
 from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, clear_stop, resume, take
 from tests.browser.sizes import PHONE, PORTRAIT
-from tests.browser.teach_sheet import open_sheet, press
+from tests.browser.teach_sheet import open_sheet, press, says
+from tests.browser.test_blocks import show
 from tests.gateway.test_programs import wait as wait_progress
 
 pytestmark = pytest.mark.long
@@ -72,4 +74,33 @@ def test_steps_of_a_program_are_controlled_in_the_list(
         wait_progress(reader, lambda run: run.breakpoints == ())
         resume(page)
         wait_progress(reader, lambda run: run.status == "done")
+    assert page.errors == []
+
+
+TO_AND_FRO = """\
+name: To and fro
+steps:
+  - repeat: {times: 50, steps: [{joints: [30, -40, 60, 30, 0]}, {joints: [-30, -40, 60, 30, 0]}]}
+"""
+
+
+def test_handle_that_is_dragged_takes_over_from_the_program(
+    page: ViserPage, server: AppServer, truth: Truth, artefacts: Path
+) -> None:
+    open_sheet(page)
+    show(page, TO_AND_FRO)
+    press(page, "Run")
+    with connect(server.url, "Reader") as reader:
+        wait_progress(reader, lambda run: run.status == "running" and run.step > 1)
+        with page.grip_arrow(MOVE, "z") as grip:
+            grip.sweep(0.05, 12)
+            wait_progress(reader, lambda run: run.status == "stopped")
+            page.wait_until(lambda: page.page.inner_text("#holder") == "You drive", "the arm")
+        truth.wait(moving=False)
+        page.wait_until(lambda: "took over" in says(page), "the reason")
+        page.keep(artefacts / "taken_over.png")
+        page.page.get_by_role("button", name="Continue ").click()
+        wait_progress(reader, lambda run: run.status == "running")
+        page.press_in_bar("End")
+        wait_progress(reader, lambda run: run.status == "stopped")
     assert page.errors == []

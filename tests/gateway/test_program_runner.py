@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.lease import Grounds, Role
+from katana450.arm.control.lease import CommandChannel, Grounds, Role
 from katana450.arm.control.session.session import Session
 from katana450.errors import LeaseError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
@@ -170,6 +170,56 @@ def test_stop_that_another_person_clears_leaves_the_lease_to_the_owner(table: St
     table.hub.release_lease(other)
     table.hub.move(other, cmd.ClearStop())
     assert table.hub.lease.holder == other.person
+
+
+MOVES = (cmd.Joint(1, 0.2), cmd.Jog(np.array((0.05, 0.0, 0.0, 0.0, 0.0))))
+
+
+@pytest.mark.parametrize("move", MOVES, ids=lambda move: type(move).__name__)
+def test_owner_takes_over_by_moving_the_arm(table: Staged, move: cmd.Command) -> None:
+    owner, other = (table.join(page, Role.OPERATOR) for page in PAGES)
+    table.run(owner)
+    table.wait(0.1, owner)
+    began = owner.actor
+    holds = table.arm.holds
+    for participant, command, reason in (
+        (other, move, "Wave holds the arm"),
+        # Neither a lost key nor the gripper takes over.
+        (owner, cmd.Jog(np.zeros(5)), "Wave holds the arm"),
+        (owner, cmd.Gripper(0.3), "Wave holds the arm"),
+    ):
+        with pytest.raises(LeaseError, match=reason):
+            table.hub.move(participant, command)
+    table.hub.move(owner, move)
+    # The gesture continues, and the arm is not braked.
+    table.hub.gate.submit(move, replace(began, seen=table.hub.gate.revocations))
+    table.wait(0.1, owner)
+    assert (table.status, table.arm.holds) == ("stopped", holds)
+    assert table.hub.lease.holder == owner.person
+    assert table.bar(owner)["why"].startswith("You took over at step 1 of 2. Continue resumes")
+    assert ProgramOrder.CONTINUE.value in table.programs.orders(owner)
+
+
+def test_handle_is_grabbed_before_its_first_command_takes_over(table: Staged) -> None:
+    owner = table.join(PAGES[0])
+    table.run(owner)
+    gesture = table.hub.at_scene(owner.person.key, table.hub.gate.revocations)
+    with pytest.raises(LeaseError, match="Wave holds the arm"):
+        table.hub.gate.claim(gesture)
+    claimed = table.hub.gate.claim(gesture, of_arm=True)
+    assert table.status == "running"
+    table.hub.gate.submit(cmd.Joint(1, 0.2), claimed)
+    table.wait(0.1, owner)
+    assert (table.status, table.hub.gate.is_current(claimed)) == ("stopped", True)
+
+
+def test_program_of_the_api_cannot_take_over_from_a_script(table: Staged) -> None:
+    owner = table.join(PAGES[0])
+    table.run(owner)
+    by_api = replace(owner.actor, channel=CommandChannel.TCP)
+    with pytest.raises(LeaseError, match="Wave holds the arm"):
+        table.hub.gate.submit(cmd.Joint(1, 0.2), by_api)
+    assert table.programs.running
 
 
 def test_run_from_before_a_stop_is_not_executed_after_it(table: Staged) -> None:

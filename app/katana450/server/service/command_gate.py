@@ -153,19 +153,22 @@ class CommandGate:
             check_in_time(actor.delay, self.sample_delay)
         if actor.channel is CommandChannel.SERVER and not command.traits.protective:
             raise LeaseError("The server itself may not move the arm.")
+        if _moves_by_hand(command, actor):
+            self._take_over(actor)
         return self._granted(actor, pacing=all(part.traits.pacing for part in command.parts))
 
-    def claim(self, actor: Actor) -> Actor:
+    def claim(self, actor: Actor, *, of_arm: bool = False) -> Actor:
         """Return ``actor`` with the grounds on which it may command now; send no command.
 
         A gesture without a command, such as grabbing a handle, uses this. Raises, and acquires a
-        free lease, as ``submit`` does.
+        free lease, as ``submit`` does. ``of_arm``: whether the gesture is at a control of the arm,
+        whose first command takes over from the program of ``actor``.
         """
         with self.lock:
             try:
                 self.check_runs()
                 self._check_settled(actor)
-                return self._granted(actor, pacing=False)
+                return self._granted(actor, pacing=of_arm)
             except LeaseError as error:
                 self.recorder.refuse("gesture", actor, error)
                 raise
@@ -426,6 +429,19 @@ class CommandGate:
         self.revocations += 1
         self._jogged = -cmd.JOG_TIME
 
+    def _take_over(self, actor: Actor) -> None:
+        """Give ``actor`` the lease of the program that it owns, which ends at its next step.
+
+        The arm is not held: the command to come continues its motion. No gesture becomes void,
+        because nobody else could drive meanwhile.
+        """
+        before, program = self.lease, self.program
+        if program is None or program != (before.holder, actor.key):
+            return
+        self.check_current(actor)
+        self.lease = before.hand_over(program.person, actor.person, self._clock())
+        self.recorder.lease("taken over", before, self.lease, actor)
+
     def _granted(self, actor: Actor, *, pacing: bool) -> Actor:
         if actor.channel is CommandChannel.SERVER:
             return replace(actor, grounds=Grounds.SERVER)
@@ -439,6 +455,18 @@ class CommandGate:
         self.acquire(actor)
         log.info("%s took the free lease (%s).", actor.name, actor.channel.value)
         return replace(actor, grounds=Grounds.FREE_LEASE)
+
+
+def _moves_by_hand(command: cmd.Command, actor: Actor) -> bool:
+    """Return whether ``actor`` moves the arm by ``command`` as a person with a handle or key does.
+
+    The end of a jog moves nothing, and a page sends it whenever it loses a key.
+    """
+    if actor.channel not in (CommandChannel.PAGE, CommandChannel.SCENE):
+        return False
+    if isinstance(command, cmd.Jog) and not command.rates.any():
+        return False
+    return any(part.traits.goal for part in command.parts)
 
 
 def guarded(note: Callable[[], None]) -> Callable[[], None]:

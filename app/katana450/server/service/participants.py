@@ -33,7 +33,7 @@ RESERVED = re.compile(r"you|somebody|nobody|(the )?server|(window|program) \d+.*
 MAX_MARKS = 2
 """Maximum number of marks on one letter."""
 
-ACTS = "pressed STOP|ended it|cancelled the planning|went to step|runs it from"
+ACTS = "pressed STOP|ended it|took over|cancelled the planning|went to step|runs it from"
 """Pattern of the acts of people in sentences."""
 
 

@@ -140,7 +140,7 @@ class Gestures:
         is_start = isinstance(message, wire.TransformControlsDragStartMessage)
         if is_start:
             check_in_time(actor.delay, self._gate.sample_delay)
-        actor = self._gate.claim(actor)
+        actor = self._gate.claim(actor, of_arm=self._guard.is_of_arm(message))
         if is_start:
             browser.drags[message.name] = actor
         return actor

@@ -26,6 +26,9 @@ log = logging.getLogger(__name__)
 PERSONAL = ("View",)
 """Controls that affect only the window in which they are clicked."""
 
+ARM_HANDLES = "/target/"
+"""Beginning of the names of the nodes by which people drag the arm."""
+
 WORKSPACE = 1.5
 """Maximum coordinate [m] of a gizmo in the base frame, more than twice the arm's reach."""
 
@@ -86,6 +89,12 @@ class Guard:
         if isinstance(message, wire.GuiUpdateMessage):
             return getattr(self._control(message), "label", None) not in PERSONAL
         return not isinstance(message, wire.ViewerCameraMessage)
+
+    def is_of_arm(self, message: Any) -> bool:
+        """Return whether ``message`` comes from a handle or a slider of the arm."""
+        if isinstance(message, wire.GuiUpdateMessage):
+            return isinstance(self._control(message), viser.GuiSliderHandle)
+        return str(getattr(message, "name", "")).startswith(ARM_HANDLES)
 
     def correction(self, message: Any) -> list[Any]:
         """Return the messages that make the sender's window show the real state again.

@@ -230,6 +230,8 @@ class ProgramRunner(Runner):
             return
         if not self._runs_as.drives:
             reason = "The lease was taken from the program."
+            if (holder := hub.lease.holder) is not None and self._owner.is_person(holder):
+                reason = f"{holder.name} took over."
             self._leave_with(runner.ended(self._run, Phase.STOPPED, reason))
             return
         owner = self._owner.participant
