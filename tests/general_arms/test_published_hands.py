@@ -101,8 +101,6 @@ KINDS = {
         *((-0.174533, 1.74533), (("moving_jaw",),), "gripper_link"),
     ),
 }
-LONG = ("xArm gripper", "Robotiq on a Panda", "three links", "one sliding jaw", "PincherX-150")
-EVERY = [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in KINDS]
 
 
 def gaps(plan: Planned, before: State, held: State, jaw: str) -> list[float]:
@@ -117,8 +115,8 @@ def gaps(plan: Planned, before: State, held: State, jaw: str) -> list[float]:
     return [world.gap(held.x_setpoint, "part", *side) for side in hand.gripping_sides]
 
 
-@pytest.mark.cases(1)
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.long
+@pytest.mark.parametrize("name", KINDS)
 def test_box_is_picked_and_placed(name: str, tmp_path: Path) -> None:
     kind = KINDS[name]
     box = item("part", "box", kind.box, kind.at, 17.0)
