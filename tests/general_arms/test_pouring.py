@@ -12,6 +12,7 @@ import pytest
 from katana450.arm.control.objects.pouring import CUP
 from katana450.arm.control.state.scene_objects import named
 from katana450.arm.control.state.state import State
+from katana450.arm.robot.collision import scene_objects_of
 from katana450.arm.robot.props import load_props
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
@@ -23,7 +24,7 @@ from katana450.extensions.programs.planning.curves import PoseTurn
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.simulation import Planned, Simulation, run_by_clock
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.steps.pouring import POURING, UNDERSIDES
+from katana450.extensions.programs.steps.pouring import EMPTY_TILT, POURING, UNDERSIDES, turns_over
 from katana450.extensions.recording.codec import Codec
 from katana450.extensions.recording.forms import FormError
 from katana450.maths.geometry import se3, so3
@@ -34,6 +35,8 @@ from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from katana450.settings import Settings
 from tests.general_arms.gripping_arms import HANDS, gripping_urdf
+from tests.general_arms.programs import begin_plan
+from tests.general_arms.published_arms import UR5E
 
 MICROMETRE = 1e-6
 
@@ -156,7 +159,14 @@ def _tilt(pour: Pour, state: State) -> float:
     return float(np.degrees(np.arccos(np.clip(pour.cup(state)[2, 2], -1.0, 1.0))))
 
 
-@pytest.mark.cases(1)
+def test_tilt_beyond_that_of_an_empty_cup_is_refused() -> None:
+    plan_state = begin_plan(UR5E)
+    cup, basin, *_ = scene_objects_of(load_props())
+    with pytest.raises(InputError, match="No tilt of the cup pours this part"):
+        next(turns_over(plan_state, cup, basin, EMPTY_TILT + 0.01))
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["four axes", "UR5e"])
 def test_flow_that_no_tilt_gives_is_refused(name: str, tmp_path: Path) -> None:
     """The last drops flow too slowly."""
