@@ -135,7 +135,7 @@ def test_no_solids_touch_where_the_bodies_are_clear(
 ) -> None:
     rng = np.random.default_rng(11)
     looked_at = 0
-    while looked_at < (40 if LONG else 12):
+    while looked_at < (40 if LONG else 8):
         x = rng.uniform(*limits)
         contact = bare.nearest(x)
         assert contact is not None

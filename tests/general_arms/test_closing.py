@@ -16,7 +16,7 @@ from katana450.arm.control.state.modes import IDLE
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import Reason, State
 from katana450.arm.robot.collision import hand_of, world_of
-from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.hands.sides import with_sides
 from katana450.extensions.programs.run.simulation import Planned, run_by_clock
@@ -42,7 +42,7 @@ BOX = (25.0, 20.0, 50.0)
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Planned:
     """Return a grasp of an SO-101, planned."""
-    part = item("part", "box", BOX, (230.0, 60.0), 17.0)
+    part = item("part", "box", BOX, (220.0, -60.0), 17.0)
     return planned(tmp_path_factory.mktemp("arm"), so101_urdf(), ["grasp: part"], part)
 
 
@@ -174,8 +174,7 @@ def test_hand_with_one_moving_link_holds_nothing(tmp_path: Path) -> None:
     assert 0.005 <= contact.amount < 0.0052
 
 
-def test_katana_has_the_sides_and_ends_of_its_file() -> None:
-    robot = load()
+def test_katana_has_the_sides_and_ends_of_its_file(robot: Robot) -> None:
     world, _ = world_of(robot)
     assert world is not None
     hand = hand_of(robot, world)

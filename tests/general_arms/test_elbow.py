@@ -75,11 +75,11 @@ def test_elbow_turns_by_an_angle_while_the_tool_rests(chain: Chain) -> None:
     session = session_of(chain)
     start = begun(session)
     # Turns in a row add up.
-    states = states_of(session, start, [cmd.TurnElbow(0.3), cmd.TurnElbow(-0.1)])
+    states = states_of(session, start, [cmd.TurnElbow(0.2), cmd.TurnElbow(-0.1)])
     check_tool_rests(session, states)
-    assert turned(chain, states) == pytest.approx(0.2, abs=1e-5)
+    assert turned(chain, states) == pytest.approx(0.1, abs=1e-5)
     assert (states[-1].findings, states[-1].branch) == ((), start.branch)
-    back = states_of(session, states[-1], [cmd.TurnElbow(-0.2)])
+    back = states_of(session, states[-1], [cmd.TurnElbow(-0.1)])
     np.testing.assert_allclose(back[-1].setpoint, start.setpoint, atol=1e-5)
 
 

@@ -75,6 +75,7 @@ def postures(chain: Chain, count: int, seed: int = 1) -> np.ndarray:
     return np.random.default_rng(seed).uniform(chain.lower, chain.upper, (count, chain.n))
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("name", ALL)
 def test_kinematics_are_those_of_the_file(tmp_path: Path, name: str) -> None:
     robot = robot_of(tmp_path, ALL[name])

@@ -134,12 +134,12 @@ def test_only_the_first_axis_may_slide(tmp_path: Path) -> None:
 def test_script_moves_the_tool_and_gives_no_lengths_as_angles(tmp_path: Path) -> None:
     session = session_of("rail", tmp_path)
     context, start = PlanContext(session, np.eye(4)), session.begin(session.ready, 0.0, 0.0)
-    text = "steps:\n  - line: {by: {x: 50, z: 30}}\n  - line: {by: {y: 20}}\n  - home\n"
+    text = "steps:\n  - line: {by: {x: 20, y: 10, z: 10}}\n  - home\n"
     program = compiled(parse(text), context, start)
     ends = [task.action.plan.end for task in program.tasks if isinstance(task.action, FollowPlan)]
     places = forward_batch(session.require_arm().chain, np.array([start.q, *ends]))[:, :3, 3]
-    np.testing.assert_allclose(places[1] - places[0], (0.05, 0.0, 0.03), atol=1e-9)
-    np.testing.assert_allclose(places[2] - places[1], (0.0, 0.02, 0.0), atol=1e-9)
+    np.testing.assert_allclose(places[1] - places[0], (0.02, 0.01, 0.01), atol=1e-9)
+    np.testing.assert_allclose(ends[-1], start.q, atol=1e-9)
     with pytest.raises(ScriptError, match=r"axis 1, .*, over its limit of -1000.0 mm .* %"):
         compiled(parse("steps:\n  - line: {by: {x: -1900}}\n"), context, start)
     for step in ("joints: [0, 0, -90, -135, 45, -90, 0]", "nudge: {axis: 1, by: 5}"):

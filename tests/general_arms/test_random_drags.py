@@ -168,7 +168,8 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
 @pytest.mark.cases(3)
 @pytest.mark.parametrize("name", ["UR5e", "xArm 6", "KR 6", "OpenMANIPULATOR-X", "skewed 6"])
 def test_drags_keep_branch_and_limits(name: str) -> None:
-    count = 20 if LONG else 12
+    # Of four axes few drags have a clear way.
+    count = 20 if LONG else 12 if ARMS[name].n == 4 else 8
     dragged = drags(ARMS[name], count)
     assert dragged.arrived + dragged.held == count
     assert dragged.arrived >= 3

@@ -22,7 +22,7 @@ from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.kinematics.conftest import katana
 from tests.kinematics.family import Offsets, limited_member, member
 
-CASES = 1000 if os.environ.get("KATANA450_LONG") else 40
+CASES = 1000 if os.environ.get("KATANA450_LONG") else 25
 
 SAME = 1e-7
 """A smaller gain [m], [rad] by a wider limit is rounding."""

@@ -24,7 +24,7 @@ LEVEL = 1e-6
 
 FRONT = tuple(branch for branch in BRANCHES if branch.shoulder == "front")
 
-COUNT = 2_000 if LONG else 600
+COUNT = 2_000 if LONG else 400
 
 
 def ring(rng: np.random.Generator, count: int, reach: float) -> FloatArray:

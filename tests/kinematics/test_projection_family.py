@@ -42,7 +42,7 @@ ARMS = {
 }
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("branch", [None, *BRANCHES], ids=str)
 @pytest.mark.parametrize("name", ARMS)
 def test_no_search_finds_a_nearer_point_or_turn(
