@@ -168,15 +168,15 @@ def test_fingers_that_stand_closer_than_5_mm_keep_half_of_their_distance(make: M
     session, world = machine.session, machine.world
     assert min(world.close.values()) == pytest.approx(1.5e-3, abs=1e-6)
     command = machine.move(finger1_spread=0.3)
-    state = during(session, begun(session), 2.0, command)[-1]
+    state = during(session, begun(session), 1.2, command)[-1]
     free = world.gap(state.x_setpoint, "finger1_link1", "finger2_link1")
-    state = during(session, state, 2.0, machine.move(finger1_spread=-0.3))[-1]
+    state = during(session, state, 1.2, machine.move(finger1_spread=-0.3))[-1]
     near = world.gap(state.x_setpoint, "finger1_link3", "finger2_link3")
     assert min(free, near) >= 1.5e-3 - DISTANCE_ROUNDING
     assert state.blocked
     assert sentence(state).endswith("mm apart: they must not come nearer.")
     # Each finger alone bends past its neighbours.
-    bent = during(session, begun(session), 3.0, machine.move(finger2_bend1=1.4))[-1]
+    bent = during(session, begun(session), 2.0, machine.move(finger2_bend1=1.4))[-1]
     assert bent.setpoint[machine.joints.names.index("finger2_bend1")] == 1.4
 
 

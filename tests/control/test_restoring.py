@@ -25,7 +25,7 @@ LATER = 4096.0
 """[s] Time of another run at which a state is restored. A sum with it loses few bits."""
 
 
-TICKS = 120 if LONG else 60
+TICKS = 120 if LONG else 40
 """Number of ticks after which a run is compared."""
 
 Beginnings = dict[type[Mode], State]

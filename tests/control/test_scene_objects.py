@@ -104,7 +104,7 @@ def test_arm_at_full_speed_stops_before_a_mesh(session: Session) -> None:
     world = session.world_at(states[-1])
     assert world is not None
     links = outlines(session, states[-1])
-    for passed in states[::60] + states[-1:]:
+    for passed in states[::120] + states[-1:]:
         poses = world.linkage.poses(x_of(passed))
         for mover, normals, heights in links:
             local = (points - poses[mover][:3, 3]) @ poses[mover][:3, :3]

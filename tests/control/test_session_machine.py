@@ -168,7 +168,7 @@ def bounded(quick: int, many: int) -> settings:
 
 
 def test_arm_keeps_its_invariants() -> None:
-    run_state_machine_as_test(ArmRules, settings=bounded(5, 250))
+    run_state_machine_as_test(ArmRules, settings=bounded(4, 250))
 
 
 def test_joints_keep_their_invariants() -> None:

@@ -134,7 +134,7 @@ def test_arm_that_does_not_follow_is_stopped_until_it_does(
 ) -> None:
     measured = DelayedArm(mode, frozen(session.ready + 0.1), note="Hold the arm.")
     state = run(session, measured, state, [cmd.Joint(1, 1.0)])
-    state = run(session, measured, state, [cmd.Joint(1, 1.0), cmd.ClearStop()], 200)
+    state = run(session, measured, state, [cmd.Joint(1, 1.0), cmd.ClearStop()], 120)
     assert state.stopped is not None
     lasting = mode in (ArmMode.COLLIDED, ArmMode.FAULT)
     why = "Hold the arm." if lasting else "The arm was not ready for setpoints."
@@ -150,7 +150,7 @@ def test_arm_that_does_not_follow_is_stopped_until_it_does(
     state = run(session, measured, state, [cmd.ClearStop()], 50)
     assert state.stopped is None
     np.testing.assert_array_equal(state.q, session.ready + 0.1)
-    state = run(session, measured, state, [cmd.Joint(1, 0.9)], 400)
+    state = run(session, measured, state, [cmd.Joint(1, 0.9)], 250)
     assert state.q[0] == 0.9
 
 

@@ -182,7 +182,7 @@ def test_what_the_hand_carries_is_slow_in_a_zone(session: Session) -> None:
 def test_a_jog_is_slow_in_a_zone(session: Session) -> None:
     state = begun(session, SLOW)
     jog = cmd.Jog(np.array((0.0, -0.4, 0.0, 0.0, 0.0)))
-    passed = list(islice(states(session, state, jog, every=True), 220))
+    passed = list(islice(states(session, state, jog, every=True), 180))
     inside = [state for state in passed if is_inside(session, state)]
     assert len(inside) > 20
     assert max(speed_of(session, state) for state in inside) <= SLOW_SPEED + 1e-9

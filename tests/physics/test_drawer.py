@@ -103,7 +103,7 @@ def test_drawer_is_pulled_by_its_handle(session: Session) -> None:
     forces = [sum(c.friction for c in s.bodies.contacts) for s in moving[30:45] if s.bodies]
     assert 2.0 < np.mean(forces) < PAD_FRICTION * 2.0 * FINGER_FORCE
     # Fingers that open leave it where it is, and it sleeps.
-    rest = settled(session, ticked(session, moving[-1], cmd.Hold(), cmd.Gripper(0.3), ticks=60))
+    rest = settled(session, ticked(session, moving[-1], cmd.Hold(), cmd.Gripper(0.3), ticks=20))
     assert rest.held is None
     assert rest.bodies is None
     assert opening(rest) == pytest.approx(opening(moving[-1]), abs=5e-3)
