@@ -10,6 +10,7 @@ import os
 import shutil
 import signal
 import tempfile
+from collections.abc import Iterator
 from typing import Any
 
 import hypothesis
@@ -23,6 +24,7 @@ from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.settings import Settings
+from tests.browser.server import AppServer
 from tests.schedule import Completeness, LowestPriority, Schedule
 
 LONG = "KATANA450_LONG" in os.environ
@@ -106,6 +108,13 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Schedule:
     """Return the schedule by which `make test` runs the tests in several processes."""
     return Schedule(config, log)
+
+
+@pytest.fixture(scope="session")
+def plain_server() -> Iterator[AppServer]:
+    """Return a server for modules of several folders, where those before them left it."""
+    with AppServer() as server:
+        yield server
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,6 @@ import re
 import shlex
 import sys
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from types import CodeType
 
@@ -84,19 +83,13 @@ SHELL = [
 ]
 
 
-@pytest.fixture(scope="module")
-def running() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
 @pytest.fixture
-def server(running: AppServer) -> AppServer:
+def server(plain_server: AppServer) -> AppServer:
     """A server whose arm may move: a program that hangs up while the arm moves stops it."""
-    with connect(running.url) as client:
+    with connect(plain_server.url) as client:
         client.clear_stop()
         client.ask(requests.ReleaseLease())
-    return running
+    return plain_server
 
 
 @pytest.fixture(scope="module")

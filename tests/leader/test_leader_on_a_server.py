@@ -30,15 +30,9 @@ MAX_LAG = 0.15
 """[s] Largest lag of the arm behind the leader."""
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
-
-
 @pytest.fixture
-def watcher(server: AppServer) -> Iterator[Client]:
-    with connect(server.url, "Watcher") as watcher:
+def watcher(plain_server: AppServer) -> Iterator[Client]:
+    with connect(plain_server.url, "Watcher") as watcher:
         yield watcher
         watcher.clear_stop()
         watcher.ask(requests.ReleaseLease())
@@ -67,9 +61,9 @@ def leader() -> Iterator[MovedLeader]:
 
 
 @pytest.fixture
-def command(server: AppServer, leader: MovedLeader, tmp_path: Path) -> list[str]:
+def command(plain_server: AppServer, leader: MovedLeader, tmp_path: Path) -> list[str]:
     file = write_calibration(tmp_path / "leader.json")
-    options = [leader.port, "--calibration", str(file), "--url", server.url]
+    options = [leader.port, "--calibration", str(file), "--url", plain_server.url]
     return [sys.executable, "-m", "katana450", "leader", *options]
 
 

@@ -30,6 +30,20 @@ from tests.cli.lines import ask
 from tests.commands import output
 from tests.robot.public_arms import PX150, urdf
 from tests.robot.xacro_files import FILE, OPEN, PACKAGE, refusal, templated
+from tests.robot.xacro_forks import run_forked
+
+STARTED = (
+    "test_a_package_is_expanded_as_it_is_published",
+    "test_the_expansion_agrees_with_the_program_xacro",
+    "test_an_expansion_that_does_not_start_says_why",
+)
+"""Tests that start the process as the app does; for the others it is forked, ten times as fast."""
+
+
+@pytest.fixture(autouse=True)
+def _forked(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    if request.function.__name__ not in STARTED:
+        monkeypatch.setattr(subprocess, "run", run_forked)
 
 
 @pytest.fixture
