@@ -531,16 +531,16 @@ class BodySimulation:
         ``before``: (b, 7) their places before the step, which they leave no faster.
         """
         data, count, deep = self._data, self._free, deep[: self._free]
-        speeds = data.qvel[6 * count : self._link_v]
-        speeds[:] = np.clip(speeds, -self._joint_limits, self._joint_limits)
+        if self._joints:
+            speeds = data.qvel[6 * count : self._link_v]
+            speeds[:] = np.clip(speeds, -self._joint_limits, self._joint_limits)
         v = data.qvel[: 6 * count].reshape(-1, 2, 3)
         # No velocity is longer than twice its largest part.
         if 2.0 * np.abs(v).max(initial=0.0) < (PARTING_SPEED if deep.any() else MAX_SPEED):
             return
         place = data.qpos[: 7 * count].reshape(-1, 7)
-        limits = np.where(deep, PARTING_SPEED, MAX_SPEED)[:, None]
+        limits = np.where(deep, PARTING_SPEED, MAX_SPEED)[:, None] * (1.0, 10.0)
         speeds = np.sqrt(np.einsum("bij,bij->bi", v, v))
-        limits = limits * (1.0, 10.0)
         fast = (speeds > limits).any(axis=1)
         if not fast.any():
             return
