@@ -13,7 +13,7 @@ from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.files.trimming import trim
 from tests.recording.recorded import record
 
-TICKS = 150
+TICKS = 110
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from tests.conftest import LONG
 from tests.programs.yaml_core import loaded
 
 ROOT = Path(__file__).resolve().parents[2]
-MISTAKES = 60 if LONG else 8
+MISTAKES = 60 if LONG else 4
 """Number of mistakes in each script."""
 
 WRONG_VALUES: tuple[Any, ...] = (

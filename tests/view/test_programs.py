@@ -17,6 +17,7 @@ from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.building.plan_state import PlanContext
+from katana450.extensions.programs.run import simulation
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.page_state import (
@@ -169,7 +170,10 @@ steps:
 """
 
 
-def test_preview_shows_cup_and_water_at_the_time(server: viser.ViserServer, robot: Robot) -> None:
+def test_preview_shows_cup_and_water_at_the_time(
+    server: viser.ViserServer, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulation, "TICK", 0.05)
     session = describe_robot(Settings(), URDF_PATH, None).session
     stage = Stage(server, robot, session)
     program = stage.compiled(POUR)
