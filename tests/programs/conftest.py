@@ -27,7 +27,8 @@ from tests.view.conftest import server
 
 __all__ = ["server"]
 
-TICK = 0.01
+TICK, PREVIEW_TICK = 0.01, 0.02
+"""[s] Periods of the control loop, and of the simulation of a preview."""
 
 
 def pour_text(**spots: tuple[float, float] | None) -> str:
@@ -56,9 +57,11 @@ class Stage:
         state = self.begin() if state is None else state
         return compiled(parse(text), self.plan_context, state, **options)
 
-    def tick(self, program: Program, run: Run, state: State) -> tuple[Run, State]:
+    def tick(
+        self, program: Program, run: Run, state: State, period: float = TICK
+    ) -> tuple[Run, State]:
         run, commands = runner.step(program, run, state, state.t)
-        state = self.session.step(state, commands, state.t + TICK)
+        state = self.session.step(state, commands, state.t + period)
         return run, self.session.observe(state, state.setpoint, state.gripper_setpoint)
 
     def loads(self, states: Sequence[State]) -> FloatArray:
@@ -68,18 +71,20 @@ class Stage:
         """
         limits = self.plan_context.arm.limits
         q = np.array([state.setpoint for state in states])
-        bounds = (limits.speed, limits.acceleration, limits.jerk)
+        bounds, period = (limits.speed, limits.acceleration, limits.jerk), states[1].t - states[0].t
         ratios = [
-            (np.abs(np.diff(q, order, axis=0)) / TICK**order / most).max()
+            (np.abs(np.diff(q, order, axis=0)) / period**order / most).max()
             for order, most in enumerate(bounds, start=1)
         ]
         return np.array(ratios)
 
-    def play(self, program: Program, state: State, most: int = 5000) -> tuple[Run, list[State]]:
+    def play(
+        self, program: Program, state: State, most: int = 5000, period: float = TICK
+    ) -> tuple[Run, list[State]]:
         """Run ``program`` to its end; return the run and all states."""
         run, states = Run(state.t, number=program.first), [state]
         while run.phase is Phase.RUNNING and len(states) < most:
-            run, state = self.tick(program, run, state)
+            run, state = self.tick(program, run, state, period)
             states.append(state)
         return run, states
 

@@ -79,9 +79,9 @@ def rest_of(stage: Stage, program: Program, run: Run, state: State) -> Program:
     return continued(interruption_of(program, run, state), stage.plan_context, state)
 
 
-def played(stage: Stage, program: Program, state: State) -> list[State]:
+def played(stage: Stage, program: Program, state: State, period: float = TICK) -> list[State]:
     """Return the states of the run of ``program``, which must succeed."""
-    run, states = stage.play(program, state)
+    run, states = stage.play(program, state, period=period)
     assert (run.phase, run.why) == (Phase.DONE, "")
     return states
 

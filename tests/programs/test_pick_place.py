@@ -84,7 +84,7 @@ def test_stacked_object_is_grasped_so_that_it_can_be_placed(stage: Stage) -> Non
     """From above, which is tried first, the arm does not reach the other object."""
     objects = box("a", (360.0, -100.0), (50.0, 50.0, 40.0)), box("b", (290.0, 0.0))
     with pytest.raises(ScriptError, match=r"b cannot be placed there: .* a pitch of 90"):
-        planned(stage, "- stack: {object: b, on: a, side: above}\n", *objects)
+        planned(stage, "- stack: {object: b, on: a, pitch: 90}\n", *objects)
     planned(stage, "- stack: {object: b, on: a}\n", *objects)
 
 
@@ -103,7 +103,7 @@ def test_plan_knows_where_it_puts_an_object(stage: Stage) -> None:
 
 
 def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
-    steps = "- pick: b\n- line: {by: {z: -53}}\n- release\n- home\n"
+    steps = "- pick: b\n- line: {by: {z: -53}}\n- release\n"
     end = played(stage, steps, box("b", NEAR, LOW))
     # Its contact with the table gives way by some micrometres.
     assert place(end["b"]) == pytest.approx([*NEAR, 0.0], abs=0.05)

@@ -22,7 +22,7 @@ from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.water.flow import Water
 from katana450.maths.water.units import MILLILITRE, ML, counted
-from tests.programs.conftest import Stage, pour_text
+from tests.programs.conftest import PREVIEW_TICK, Stage, pour_text
 from tests.programs.test_continuation import interruption_of, played, rest_of, stop
 from tests.ticks import rested
 
@@ -95,7 +95,7 @@ def test_stopped_pour_loses_no_drop_and_is_completed(
     full = volume_in_cup(poured[0][1])
     half = next(tick for tick in poured if volume_in_cup(tick[1]) <= 0.5 * full)
     run, state = stop(stage, pour, *half)
-    states = played(stage, rest_of(stage, pour, run, state), state)
+    states = played(stage, rest_of(stage, pour, run, state), state, PREVIEW_TICK)
     assert 0.1 * full < volume_in_cup(states[0]) < 0.9 * full
     assert volume_in_cup(states[-1]) < 0.01 * full
     last = states[-1].poured

@@ -18,7 +18,7 @@ from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry import se3
 from katana450.maths.water.units import MILLILITRE, ML, counted
-from tests.programs.conftest import Stage
+from tests.programs.conftest import PREVIEW_TICK, Stage
 
 SCENE = """\
 frame: base
@@ -99,7 +99,7 @@ def test_nothing_is_spilled_beside_a_glass(
     stage: Stage, full: int, pour: str, size: list[int], pose: list[int]
 ) -> None:
     program, start = started(stage, f"- pour: {pour}\n", full=full, size=size, pose=pose)
-    run, states = stage.play(program, start, most=20_000)
+    run, states = stage.play(program, start, 20_000, PREVIEW_TICK)
     assert (run.phase, run.why) == (Phase.DONE, "")
     assert states[-1].poured is not None
     water = states[-1].poured.water
