@@ -22,7 +22,7 @@ from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.steps.place import Pick, PlaceHeld
 from katana450.maths.geometry import se3, so3
 from katana450.maths.planning.plan import MARGIN
-from tests.programs.conftest import TICK, Stage
+from tests.programs.conftest import PREVIEW_TICK, TICK, Stage
 
 NEAR, AT = (240.0, 90.0), (230.0, -120.0)
 """[mm] Places on the table that the arm reaches from above."""
@@ -52,7 +52,7 @@ def planned(stage: Stage, steps: str, *objects: SceneObject) -> tuple[Program, S
 def played(stage: Stage, steps: str, *objects: SceneObject) -> dict[str, SceneObject]:
     """Run the steps; return the objects at the end by their names."""
     program, start = planned(stage, steps, *objects)
-    run, states = stage.play(program, start)
+    run, states = stage.play(program, start, period=PREVIEW_TICK)
     assert run.phase is Phase.DONE
     assert all(not state.findings for state in states[::10])
     return {scene_object.name: scene_object for scene_object in states[-1].objects}
@@ -122,7 +122,7 @@ OBJECTS = (
 def holding(stage: Stage) -> State:
     """The hand holds `part` over its place."""
     program, start = planned(stage, "- pick: part\n", *OBJECTS)
-    return stage.play(program, start)[1][-1]
+    return stage.play(program, start, period=PREVIEW_TICK)[1][-1]
 
 
 @pytest.mark.parametrize(
