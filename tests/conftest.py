@@ -110,9 +110,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Schedule:
     return Schedule(config, log)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def plain_server() -> Iterator[AppServer]:
-    """Return a server for modules of several folders, where those before them left it."""
+    """Return a server for all tests of a module, each of which finds it as the last one left it."""
     with AppServer() as server:
         yield server
 

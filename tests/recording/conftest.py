@@ -33,13 +33,13 @@ def records(recorded_run: tuple[Path, list[TickRecord]]) -> list[TickRecord]:
     return recorded_run[1]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def server_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the shared server: its ring, its episodes and temporary files."""
     return tmp_path_factory.mktemp("server")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def shared_server(server_folder: Path) -> Iterator[AppServer]:
     """Return a server for several modules, which begin with what those before them recorded.
 
