@@ -201,6 +201,7 @@ def test_all_fields_of_a_message_are_one_command(nodes: VrmlNodes, state: State)
         ("axis_9", "rotation", [0, 1, 0, 0.1], "no node 'axis_9'"),
         ("axis_2", "scale", [1, 1, 1], "is a Transform with rotation; it has no field 'scale'"),
         ("pan_link", "translation", [0, 0, 0], "not the tool frame of the arm and cannot be set"),
+        ("flange", "translation", [0.3, 0, 0.2], "flange is not the tool frame .* Set tcp."),
         (
             "axis_2",
             "rotation",

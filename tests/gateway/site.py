@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -30,9 +30,9 @@ class Site(NamedTuple):
 
 
 @contextmanager
-def open_site(folder: Path, *options: str) -> Iterator[Site]:
+def open_site(folder: Path, *options: str, command: Sequence[str] = APP) -> Iterator[Site]:
     """Start a server with ``options``, whose access file is in ``folder``."""
     path = folder / "access.json"
     file = AccessFile.create(path)
-    with AppServer((*APP, "--access", str(path), *options)) as server:
+    with AppServer((*command, "--access", str(path), *options)) as server:
         yield Site(server, file)

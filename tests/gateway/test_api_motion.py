@@ -17,7 +17,6 @@ from katana450.arm.control.state.state import Reason
 from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot, loads_of
 from katana450.client import Client, RefusedError
-from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.statics import holding_torques
 from katana450.maths.kinematics.velocity import limit_distances, singular_values
@@ -258,25 +257,19 @@ def test_slow_watcher_learns_of_a_stop_at_once(local: VirtualServer, program: Cl
         assert time.monotonic() - began < 2.0
 
 
-PLACE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
-
-
 def test_printed_pose_is_accepted_and_its_rounding_reported(
     program: Client, arm: MountedArm
 ) -> None:
+    T = forward(arm.chain, THERE)
     for decimals in (6, 5, 4):
-        check_printed(program, forward(arm.chain, PLACE), decimals)
-
-
-def check_printed(program: Client, T: FloatArray, decimals: int) -> None:
-    rounding = 0.5 * 10.0**-decimals
-    printed = T.round(decimals)
-    accepted = program.ask(requests.Pose(T=printed))
-    assert isinstance(accepted, answers.Done)
-    assert accepted.rotation_misfit is not None
-    assert 1e-3 * rounding < accepted.rotation_misfit < 4.0 * rounding
-    state = program.go(requests.Pose(T=printed))
-    np.testing.assert_allclose(np.array(state.T), T, rtol=0, atol=10.0 * rounding)
+        rounding = 0.5 * 10.0**-decimals
+        printed = T.round(decimals)
+        accepted = program.ask(requests.Pose(T=printed))
+        assert isinstance(accepted, answers.Done)
+        assert accepted.rotation_misfit is not None
+        assert 1e-3 * rounding < accepted.rotation_misfit < 4.0 * rounding
+        state = program.go(requests.Pose(T=printed))
+        np.testing.assert_allclose(np.array(state.T), T, rtol=0, atol=10.0 * rounding)
 
 
 def test_object_is_placed_near_a_point_of_the_table(program: Client) -> None:

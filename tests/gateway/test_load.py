@@ -7,14 +7,13 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from statistics import median
 
-import pytest
-
 from katana450.arm.control.lease import Role
-from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer
-from tests.gateway.client import HOUR, Control, controlling, enter
+from tests.gateway.client import Control, controlling
+from tests.gateway.site import open_site
 from tests.gateway.virtual import VirtualServer
 
 SOON = 1.0
@@ -30,8 +29,8 @@ FEW_DESCRIPTORS = ("sh", "-c", 'ulimit -n 1024; exec "$0" "$@"', *APP)
 
 
 @contextmanager
-def silent(port: int, count: int, data: bytes = b"") -> Iterator[list[socket.socket]]:
-    """Open ``count`` connections that send ``data`` and nothing more."""
+def silent(port: int, count: int) -> Iterator[None]:
+    """Open ``count`` connections that send nothing."""
     sockets: list[socket.socket] = []
     try:
         for _ in range(count):
@@ -40,8 +39,7 @@ def silent(port: int, count: int, data: bytes = b"") -> Iterator[list[socket.soc
             connection.settimeout(2.0)
             with suppress(OSError):
                 connection.connect(("127.0.0.1", port))
-                connection.sendall(data)
-        yield sockets
+        yield
     finally:
         for connection in sockets:
             connection.close()
@@ -59,33 +57,13 @@ async def stop_seconds(control: Control, times: int, seconds: float = 30.0) -> l
     return sorted(took)
 
 
-@pytest.fixture(scope="module")
-def tokens(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Return the token of a link for each role, and under ``file`` the access file."""
-    file = AccessFile.create(tmp_path_factory.mktemp("access") / "access.json")
-    ends = time.time() + HOUR
-    tokens = {role.value: file.give(role.value, role, ends) for role in Role}
-    return {"file": str(file.path), **tokens}
-
-
-@pytest.fixture(scope="module")
-def guarded(tokens: dict[str, str]) -> Iterator[AppServer]:
-    """Start a server that requires links and may have 1024 open files."""
-    with AppServer((*FEW_DESCRIPTORS, "--access", tokens["file"])) as server:
-        yield server
-
-
-def test_silent_connections_do_not_delay_stop(guarded: AppServer, tokens: dict[str, str]) -> None:
-    cookie = enter(guarded.url, tokens["operator"])
-
-    async def act() -> None:
-        async with controlling(guarded.url, cookie) as control:
+def test_silent_connections_do_not_delay_stop(tmp_path: Path) -> None:
+    async def act(server: AppServer, cookie: str) -> None:
+        async with controlling(server.url, cookie) as control:
             await control.wait()
             task = asyncio.create_task(stop_seconds(control, 20))
-            with silent(guarded.port, 0) as _:
-                pass
             # They connect in a thread, so that the event loop of this test is not blocked.
-            holding = silent(guarded.port, SILENT)
+            holding = silent(server.port, SILENT)
             await asyncio.to_thread(holding.__enter__)
             try:
                 took = await task + await stop_seconds(control, 10)
@@ -93,10 +71,11 @@ def test_silent_connections_do_not_delay_stop(guarded: AppServer, tokens: dict[s
                 holding.__exit__(None, None, None)
             assert median(took) < SOON
 
-    asyncio.run(act())
-    # The log has a line now and then, and no traceback for each connection.
-    assert len(guarded.output.splitlines()) < 100, guarded.output
-    assert "Traceback" not in guarded.output
+    with open_site(tmp_path, command=FEW_DESCRIPTORS) as site:
+        asyncio.run(act(site.server, site.cookie(Role.OPERATOR)))
+        # The log has a line now and then, and no traceback for each connection.
+        assert len(site.server.output.splitlines()) < 100, site.server.output
+        assert "Traceback" not in site.server.output
 
 
 def test_http_questions_take_from_the_same_budget(local: VirtualServer) -> None:

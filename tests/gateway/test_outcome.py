@@ -65,19 +65,6 @@ def test_command_beyond_a_limit_is_limited_with_the_finding(program: Client) -> 
     assert done(program.ask(requests.Home())).outcome == "accepted"
 
 
-def test_command_that_the_session_drops_is_refused_with_the_reason(program: Client) -> None:
-    program.ask(requests.Place(name="ball", shape=requests.Shape.SPHERE, size=[0.02]))
-    assert done(program.ask(requests.Remove(name="ball"))).outcome == "accepted"
-    with pytest.raises(RefusedError, match="no 'ball'"):
-        program.ask(requests.Remove(name="ball"))
-
-
-def test_samples_of_a_stream_are_answered_at_once(program: Client) -> None:
-    q = np.array(program.query(answers.State).q)
-    assert done(program.ask(requests.Servo(q=q))).outcome == "accepted"
-    assert done(program.ask(requests.Jog(rates=np.array((0.0,) * 5)))).outcome == "accepted"
-
-
 def plain_sample(kind: type[requests.Request]) -> requests.Request:
     """Return a request of a class whose fields are numbers, near 0.1 within their bounds."""
     values: dict[str, Any] = {}

@@ -257,14 +257,8 @@ def test_program_of_the_driver_supersedes_the_planning_of_another(table: Staged)
     assert "Window 2, who drives, has sent another program." in notice["why"]
 
 
-def run(table: Staged, owner: Participant) -> None:
-    table.plan(owner)
-    table.programs.handle(owner, Steer(order=ProgramOrder.RUN))
-    assert table.status == "running"
-
-
 def test_program_ends_without_its_owner(table: Staged) -> None:
-    run(table, table.join(PAGES[0]))
+    table.run(table.join(PAGES[0]))
     table.wait(2.0 * OWNER_SILENCE)
     assert table.status == "stopped"
 
@@ -294,7 +288,7 @@ async def test_program_of_a_disconnected_person_ends(table: Staged, revoke: bool
     people.add(connection)
     owner = table.hub.join(oda, "page", lambda _: None)
     admin = table.hub.join(Identity("ada", "Ada", Role.ADMIN), "page", lambda _: None)
-    run(table, owner)
+    table.run(owner)
     (number,) = people.shown
     kick = requests.Kick(person=number, seconds=60.0, revoke=revoke)
     table.hub.add_handler(PeopleRequests(table.hub, Namespace()))

@@ -16,10 +16,8 @@ from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Breakpoints, Preview, Program, ProgramOrder, Steer
 from tests.gateway.client import Control
-from tests.gateway.postures import FAR
+from tests.gateway.postures import FAR, READY
 from tests.gateway.virtual import VirtualServer
-
-READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
 
 THERE_AND_BACK = """\
 name: There and back

@@ -31,10 +31,6 @@ def table(session: Session) -> Staged:
     return Staged(session)
 
 
-def paused(table: Staged, *, value: bool) -> None:
-    table.arm.rest = replace(table.arm.rest, paused=value)
-
-
 def test_server_pauses_after_a_person_has_paused(table: Staged) -> None:
     driver = table.join(PAGES[0])
     table.hub.move(driver, cmd.Pause())
@@ -105,7 +101,7 @@ def test_running_program_shows_its_task_step_and_remaining_time(table: Staged) -
     progress = table.progress
     assert progress.seconds_left == pytest.approx(24.5, abs=0.2)
     table.programs.steer(owner, ProgramOrder.PAUSE)
-    paused(table, value=True)
+    table.arm.rest = replace(table.arm.rest, paused=True)
     shown = table.bar(other)
     assert (shown["mood"], shown["headline"]) == ("paused", "Paused")
     assert shown["why"].startswith("Nap: wait, step 1 of 2, 25 s left.")

@@ -7,7 +7,8 @@ import io
 import socket
 import time
 import zipfile
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,15 +17,15 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from katana450.arm.control.lease import Role
-from katana450.assembly.robot_session import DescribedRobot
 from katana450.extensions.importers.formats.shape_file import SECONDS
 from katana450.extensions.importers.uploads import WAITING, WAITING_EACH
 from katana450.server.web import bodies
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.bodies import BODY_SECONDS, body_of
-from tests.browser.server import APP, AppServer
+from tests.browser.server import AppServer
 from tests.exchange.test_reading_time import star
 from tests.gateway.client import HOUR, ask
+from tests.gateway.site import open_site
 from tests.gateway.virtual import VirtualServer
 
 SLOW_MESHES = 20
@@ -33,19 +34,8 @@ SLOW_MESHES = 20
 BOX: bytes = trimesh.creation.box((20.0, 20.0, 20.0)).export(file_type="stl")
 
 
-@pytest.fixture(scope="module")
-def links(tmp_path_factory: pytest.TempPathFactory) -> AccessFile:
-    return AccessFile.create(tmp_path_factory.mktemp("uploads") / "access.json")
-
-
-@pytest.fixture(scope="module")
-def server(links: AccessFile) -> Iterator[AppServer]:
-    with AppServer((*APP, "--access", str(links.path))) as server:
-        yield server
-
-
-def bearer(links: AccessFile, role: Role) -> str:
-    return f"Bearer {links.give('Uploader', role, time.time() + HOUR)}"
+def bearer(file: AccessFile, role: Role) -> str:
+    return f"Bearer {file.give('Uploader', role, time.time() + HOUR)}"
 
 
 def head(server: AppServer, token: str, path: str, length: int) -> bytes:
@@ -72,18 +62,20 @@ def slow_scene() -> bytes:
 
 
 @pytest.mark.long
-def test_abandoned_scene_stops_being_read(server: AppServer, links: AccessFile) -> None:
+def test_abandoned_scene_stops_being_read(tmp_path: Path) -> None:
     scene = slow_scene()
-    with socket.create_connection(("127.0.0.1", server.port)) as left:
-        left.sendall(head(server, bearer(links, Role.OPERATOR), "scene", len(scene)) + scene)
-        time.sleep(1.0)
-    began = time.monotonic()
-    token = bearer(links, Role.OPERATOR)
-    status, _, body = ask(f"{server.url}/api/v1/mesh?name=box.stl", data=BOX, Authorization=token)
-    assert status == 200, body
-    # The scene alone would take its 100 s.
-    assert time.monotonic() - began < 2.0 * SECONDS
-    assert "Traceback" not in server.output
+    with open_site(tmp_path) as (server, file):
+        token = bearer(file, Role.OPERATOR)
+        with socket.create_connection(("127.0.0.1", server.port)) as left:
+            left.sendall(head(server, token, "scene", len(scene)) + scene)
+            time.sleep(1.0)
+        began = time.monotonic()
+        url = f"{server.url}/api/v1/mesh?name=box.stl"
+        status, _, body = ask(url, data=BOX, Authorization=bearer(file, Role.OPERATOR))
+        assert status == 200, body
+        # The scene alone would take its 100 s.
+        assert time.monotonic() - began < 2.0 * SECONDS
+        assert "Traceback" not in server.output
 
 
 async def drips(server: VirtualServer, token: str, name: str = "a.stl") -> int:
@@ -106,26 +98,25 @@ async def drips(server: VirtualServer, token: str, name: str = "a.stl") -> int:
 
 
 def test_dripping_uploads_give_their_places_away_and_leave_one_to_an_admin(
-    described: DescribedRobot, links: AccessFile
+    guarded: VirtualServer, file: AccessFile
 ) -> None:
-    async def act(server: VirtualServer) -> None:
-        tokens = [bearer(links, Role.OPERATOR) for _ in range(WAITING // WAITING_EACH)]
-        began = server.loop.time()
+    async def act() -> None:
+        tokens = [bearer(file, Role.OPERATOR) for _ in range(WAITING // WAITING_EACH)]
+        began = guarded.loop.time()
         dripping = [
-            asyncio.create_task(drips(server, token))
+            asyncio.create_task(drips(guarded, token))
             for token in tokens
             for _ in range(WAITING_EACH)
         ]
         await asyncio.sleep(0.3 * BODY_SECONDS)
         assert not any(upload.done() for upload in dripping)
-        assert await drips(server, tokens[0]) == 429
-        assert await drips(server, bearer(links, Role.OPERATOR)) == 429
-        admin = asyncio.create_task(drips(server, bearer(links, Role.ADMIN)))
+        assert await drips(guarded, tokens[0]) == 429
+        assert await drips(guarded, bearer(file, Role.OPERATOR)) == 429
+        admin = asyncio.create_task(drips(guarded, bearer(file, Role.ADMIN)))
         assert await asyncio.gather(*dripping, admin) == [408] * (WAITING + 1)
-        assert server.loop.time() - began < 4.0 * BODY_SECONDS
+        assert guarded.loop.time() - began < 4.0 * BODY_SECONDS
 
-    with VirtualServer(described, access=links) as server:
-        server.run(act(server))
+    guarded.run(act())
 
 
 def request_of(chunks: AsyncIterator[bytes]) -> Request:
