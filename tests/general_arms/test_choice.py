@@ -170,20 +170,6 @@ def test_missing_condition_is_named(chain: Chain, missing: str) -> None:
     assert re.search(missing, method), method
 
 
-def test_rounded_file_is_solved_as_the_exact_arm_that_it_means() -> None:
-    rounded = ur5e(round(QUARTER, 5), twist_4=2e-6, length_6=3e-6)
-    exact, notes = exact_arm(rounded)
-    assert len(notes) == 1
-    assert "nearest exact arm" in notes[0]
-    q = np.array([0.3, -1.0, 1.2, 0.4, 0.9, 0.6])
-    assert np.abs(forward(exact, q) - forward(rounded, q)).max() < 5e-5
-    solutions = kinematics_of(exact).inverse(forward(exact, q), q)
-    assert (
-        min(float(np.abs(solution.q - q).max()) for solution in solutions if solution.exact) < 1e-9
-    )
-    assert exact_arm(UR5E).notes == ()
-
-
 def test_deviation_beyond_rounding_is_no_closed_form() -> None:
     bent = ur5e(twist_4=math.radians(0.1))
     assert kinematics_of(bent).method.startswith("elimination for six axes with an offset wrist")

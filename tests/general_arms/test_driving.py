@@ -279,15 +279,3 @@ def test_position_only_leaves_the_orientation_free() -> None:
     state = settled(session, start, position_only)
     np.testing.assert_allclose(pose(session, state)[:3, 3], target, atol=1e-6)
     assert state.status is Status.OK
-
-
-def test_drag_beside_the_base_is_held_at_a_singularity_and_says_so() -> None:
-    """The wrist of a UR cannot pass its singularity in a straight line without a leap."""
-    session = session_of(UR5E)
-    q = np.radians([0.0, -90.0, -90.0, -90.0, 20.0, 0.0])
-    start = session.begin(q, 0.0, 0.0)
-    T = pose(session, start)
-    turned = so3.exp(so3.log(np.eye(3)) + T[:3, :3] @ np.array([0.0, -1.2, 0.0])) @ T[:3, :3]
-    state = settled(session, start, [cmd.Orient(turned)])
-    assert state.branch == start.branch
-    assert str(session.require_arm().kinematics.branch_of(state.goal)) == start.branch

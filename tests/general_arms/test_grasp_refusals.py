@@ -16,14 +16,12 @@ from katana450.extensions.programs.planning.hand_planning import hand_of
 from katana450.maths.geometry import so3
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.gripping_arms import HANDS, gripping_urdf
-from tests.general_arms.published_arms import SKEWED_6
 from tests.general_arms.published_hands import HOOK, RADIAL, VICE, hand_urdf, so101_urdf
 from tests.general_arms.test_grasping import item, planned
 
 PART = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0))
 WIDE = item("part", "box", (90.0, 95.0, 60.0), (500.0, 100.0))
 THIN = item("part", "box", (40.0, 50.0, 8.0), (500.0, 100.0))
-LOW = item("part", "box", (40.0, 40.0, 20.0), (500.0, 100.0))
 FIXED = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0), can_be_held=False)
 FAR = item("part", "box", (25.0, 25.0, 50.0), (600.0, 0.0))
 FLAT = item("part", "box", (25.0, 25.0, 15.0), (280.0, 0.0))
@@ -38,10 +36,6 @@ STRAIGHT = item("part", "box", (25.0, 20.0, 50.0), (200.0, 0.0))
         (["pick: part"], WIDE, r"90 mm wide, .* fingers are 85 mm apart .* may have 73 mm"),
         (["pick: part"], THIN, "8.0 mm high, and the minimum is 12 mm"),
         (["pick: part"], FIXED, "cannot be held by the fingers"),
-        pytest.param(
-            *(["grasp: {object: part, pitch: 5}"], LOW, "at its place: .* and table would"),
-            marks=pytest.mark.long,
-        ),
         (["set_down:"], PART, "holds no object that this program grasped"),
     ],
 )
@@ -118,12 +112,6 @@ def test_hand_that_cannot_grasp_is_named(name: str, tmp_path: Path) -> None:
     urdf, why = HANDS_THAT_CANNOT[name]
     with pytest.raises(ScriptError, match=why):
         planned(tmp_path, urdf, ["pick: part"], PART)
-
-
-def test_skewed_arm_without_a_closed_form_is_refused_in_time(tmp_path: Path) -> None:
-    """It has no gripper either, and no posture is searched before that is reported."""
-    with pytest.raises(ScriptError, match="has no gripper"):
-        planned(tmp_path, chain_urdf("arm", SKEWED_6), ["pick: part"], PART)
 
 
 def test_fixed_jaw_on_the_other_side_is_not_out_of_reach(tmp_path: Path) -> None:

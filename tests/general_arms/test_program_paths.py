@@ -73,11 +73,6 @@ def test_three_axes_choose_no_orientation() -> None:
         program(THREE_AXES, "line: {pitch: 5}")
 
 
-def test_arm_without_fingers_has_no_hand() -> None:
-    with pytest.raises(InputError, match="has no gripper"):
-        _ = begin_plan(UR5E).hand
-
-
 @every({"UR5e": UR5E}, {"Panda": PANDA, "OpenMANIPULATOR-X": OPENMANIPULATOR_X})
 def test_plan_is_recorded_to_the_bit(chain: Chain) -> None:
     d, p = 0.3 * length(chain), middle(chain)
