@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -132,12 +132,19 @@ def test_opened_jaw_leaves_the_part_standing(plan: Planned, before: State) -> No
     assert abs(free.objects[0].T[2, 3]) < 1e-3
 
 
-def test_answer_and_description_name_the_closed_end_first(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("hand", "gripper", "slides"),
+    [(ROBOTIQ_2F_85, (0.8, 0.0, 2.0), False), (RADIAL, (0.0, 0.04, 0.1), True)],
+)
+def test_answer_and_description_name_the_closed_end_first(
+    tmp_path: Path, hand: Any, gripper: tuple[float, ...], slides: bool
+) -> None:
     path = tmp_path / "arm.urdf"
-    path.write_text(hand_urdf("UR5e", ROBOTIQ_2F_85), encoding="utf-8")
+    path.write_text(hand_urdf("UR5e", hand), encoding="utf-8")
     robot, session, _ = find_robot(Settings(), path, None)
     handle = cast("ArmHandle", SimpleNamespace(robot=robot, session=session))
-    assert serialize.arm(handle).gripper == (0.8, 0.0, 2.0)
+    answer = serialize.arm(handle)
+    assert (answer.gripper, answer.gripper_slides) == (gripper, slides)
 
 
 def test_hand_that_is_not_understood_closes_at_the_lower_end(tmp_path: Path) -> None:

@@ -74,9 +74,6 @@ XARM = tuple(
 )
 FINGERS = (("left",), ("right",))
 KINDS = {
-    "closing upwards": Kind(
-        *(gripping_urdf("UR5e", upside_down=True), NEAR, AWAY, BOX, (0.0, -0.0425), FINGERS)
-    ),
     "Robotiq 2F-85": Kind(
         *(hand_urdf("UR5e", ROBOTIQ_2F_85), NEAR, AWAY, BOX, (0.8, 0.0), ROBOTIQ)
     ),

@@ -26,14 +26,10 @@ coordinates = st.floats(-2.0, 2.0, allow_subnormal=False)
 points = st.tuples(coordinates, coordinates, coordinates).map(np.array)
 
 
-def _unit(v: tuple[float, float, float]) -> FloatArray:
-    return np.array(v) / math.hypot(*v)
-
-
 directions = (
     st.tuples(coordinates, coordinates, coordinates)
     .filter(lambda v: math.hypot(*v) > 1e-3)
-    .map(_unit)
+    .map(lambda v: np.array(v) / math.hypot(*v))
 )
 rotation_vectors = st.builds(lambda n, theta: n * theta, directions, angles)
 twists = st.builds(lambda w, v: np.concatenate((w, v)), rotation_vectors, points)

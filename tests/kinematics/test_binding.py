@@ -67,12 +67,6 @@ def misses(p: Projection, priority: Priority) -> tuple[float, ...]:
     return p.position_error, p.pitch_error
 
 
-def same_way(chain: Chain, a: Projection, b: Projection) -> bool:
-    """Return True if both tools face away from axis 1, or both towards it."""
-    (one, _), (two, _) = (pitch_and_roll(chain, projection.q) for projection in (a, b))
-    return abs(math.remainder(one - two, math.tau)) <= SAME
-
-
 def gained(before: tuple[float, ...], after: tuple[float, ...], least: float) -> int:
     """Return 1 if `after` is nearer, -1 if it is farther, by more than `least`; else 0."""
     for miss, miss_after in zip(before, after, strict=True):
@@ -101,7 +95,9 @@ def test_reported_limits_are_exactly_the_binding_ones(name: str, priority: Prior
         if p.position_error > SAME and pitched and not p.limits:
             free = project(chain, T, priority=priority, branch=p.branch, within_limits=False)  # type: ignore[arg-type]
             # With the pitch kept, a limit may keep the tool from facing the other way.
-            if priority is not Priority.PITCH or same_way(chain, p, free):
+            (one, _), (two, _) = (pitch_and_roll(chain, near.q) for near in (p, free))
+            faces_alike = abs(math.remainder(one - two, math.tau)) <= SAME
+            if priority is not Priority.PITCH or faces_alike:
                 assert gained(missed, misses(free, priority), SAME) <= 0
 
         # The roll counts least and depends on its own limit alone.

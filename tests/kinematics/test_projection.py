@@ -153,16 +153,11 @@ def test_beyond_reach_the_arm_stretches_towards_the_target(chain: Chain) -> None
         assert p.limits == ()
 
 
-def overdriven(chain: Chain, axis: int) -> tuple[FloatArray, FloatArray]:
-    """Return a posture with one axis 0.1 rad beyond its limit, and its pose."""
-    q = np.array([0.3, -0.8, 1.0, 0.4, 0.5])
-    q[axis] = chain.upper[axis] + 0.1
-    return q, forward(chain, q)
-
-
 @pytest.mark.parametrize("axis", range(5))
 def test_limit_binds_only_within_limits(chain: Chain, axis: int) -> None:
-    q, T = overdriven(chain, axis)
+    q = np.array([0.3, -0.8, 1.0, 0.4, 0.5])
+    q[axis] = chain.upper[axis] + 0.1
+    T = forward(chain, q)
     branch = branch_of(chain, q)
     free = project(chain, T, branch=branch, within_limits=False)
     assert free.position_error < 2e-15

@@ -16,14 +16,11 @@ from katana450.arm.drivers.driver import SimulatedDriver
 from katana450.arm.robot.link import SLOW_TURN
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
-from katana450.client.client import connect
 from katana450.errors import RobotDescriptionError
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.solver import inverse
-from katana450.server.api import answers, requests
 from katana450.settings import Settings
-from tests.browser.server import APP, AppServer
 from tests.robot.hands import rail
 from tests.robot.public_arms import (
     KATANAS,
@@ -277,35 +274,6 @@ def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -
     # Less than the last digit of the file, and the amount in the note.
     assert np.linalg.norm(moved, axis=1).max() < 1.5e-6
     assert "about 0.001 mm" in note
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "joints",
-    [
-        PX150,
-        KATANAS["katana_300"],
-        SO101,
-    ],
-    ids=["px150", "300", "so101"],
-)
-def test_they_are_served_with_their_grippers(tmp_path: Path, joints: list[J]) -> None:
-    path = written(tmp_path, "arm", joints)
-    with AppServer((*APP, "--urdf", str(path))) as server:
-        assert server.running
-        assert "Traceback" not in server.output
-        assert "Joints only" not in server.output
-        with connect(server.url) as client:
-            arm = client.query(answers.Arm)
-            assert arm.gripper is not None
-            closed, opened, _ = arm.gripper
-            assert arm.gripper_slides == (opened < 0.1)
-            state = next(iter(client.states()))
-            assert state.touch is None
-            assert closed <= state.gripper <= opened
-            assert client.go(requests.Gripper(angle=opened)).gripper == opened
-            q = [angle + 0.05 for angle in state.q]
-            np.testing.assert_allclose(client.joints(q).q, q, atol=1e-9)
 
 
 ARM = Path(__file__).resolve().parent / "arms" / "pincherx_150.urdf"

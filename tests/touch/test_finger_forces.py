@@ -50,12 +50,6 @@ def hand(session: Session) -> Hand:
     return hand
 
 
-def with_preload(session: Session, holding: State, preload: float) -> State:
-    """Return the state a while after a command that closes ``preload`` [rad] beyond the cup."""
-    assert holding.grip is not None
-    return ticked(session, rested(session, holding, cmd.Gripper(holding.grip - preload)), ticks=30)
-
-
 def test_command_beyond_the_object_is_its_preload(session: Session, holding: State) -> None:
     assert holding.grip is not None
     assert holding.squeeze == holding.grip + 0.44
@@ -84,9 +78,11 @@ def test_stop_and_restart_keep_the_preload_and_opening_clears_it(
 def test_both_fingers_press_alike_and_harder_with_more_preload(
     session: Session, hand: Hand, holding: State
 ) -> None:
+    assert holding.grip is not None
     forces = []
     for preload in (0.02, 0.05, 0.09, 0.3):
-        by_finger = finger_forces(hand, with_preload(session, holding, preload))
+        closed = rested(session, holding, cmd.Gripper(holding.grip - preload))
+        by_finger = finger_forces(hand, ticked(session, closed, ticks=30))
         assert list(by_finger) == SIDES
         right, left = by_finger.values()
         assert right == pytest.approx(left, rel=0.1)
