@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,14 +22,11 @@ from katana450.assembly.event_log.record_maker import (
     content_of,
     record,
 )
-from katana450.client import connect
 from katana450.server.api import requests
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.recorder import MAX_WAITING, Note, Recorder
-from tests.browser.server import APP, AppServer
 from tests.control.test_commands import examples
-from tests.event_log.logs import records
 
 ANNA = Actor(
     Person("secret/page", "Anna", Role.OPERATOR, address="10.0.0.7"),
@@ -215,23 +211,3 @@ def test_lease_of_a_driver_who_left_is_recorded_as_free(closed: bool) -> None:
         ("acquired", "the lease was free") if closed else ("taken", "an admin may take the lease")
     )
     assert (record["what"]["from"], record["what"]["to"]) == ("Bert", "Anna")
-
-
-@pytest.mark.long
-def test_flood_of_stops_on_a_server_is_counted(tmp_path: Path) -> None:
-    with AppServer((*APP, "--log", str(tmp_path))) as server:
-        with connect(server.url, "Flood") as flood, connect(server.url, "Anna") as arm:
-            arm.ask(requests.Speed(value=0.5))
-            for _ in range(400):
-                flood.ask(requests.Stop())
-            arm.clear_stop()
-            arm.ask(requests.Nudge(axis=1, by=0.1))
-        server.stop()
-    log = records(tmp_path)
-    stops = [row for row in log if row["kind"] == "stop" and row["who"]["name"] == "Flood"]
-    more = [row for row in log if row["kind"] == "more"]
-    assert len(stops) < 150
-    assert len(stops) + sum(row["what"]["count"] for row in more) == 400
-    assert "repeated" not in stops[0]["what"]
-    commands = [row["what"]["command"] for row in log if row["kind"] in ("command", "clear")]
-    assert commands == ["Speed", "ClearStop", "Nudge"]

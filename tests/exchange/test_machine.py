@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from katana450.arm.control.commands import commands as cmd
 from katana450.arm.robot.loader import load
-from katana450.assembly.robot_session import find_robot
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.urdf_package import package_files
 from katana450.extensions.export.vrml.vrml_files import vrml_files, world_of
-from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 from tests.exchange.vrml_reading import read_world
 from tests.robot.urdf_files import saved
-
-ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
 
 def test_followers_limit_their_leader() -> None:
@@ -93,25 +87,3 @@ def test_drivable_mechanisms_can_be_exported(tmp_path: Path, seed: int) -> None:
         assert all(files.values())
     world = read_world(exports[0]["tree.wrl"].decode())
     assert set(robot.joint_group.names) <= set(world.named())
-
-
-def test_arm_with_a_skewed_axis_is_solved_numerically_for_a_reason(tmp_path: Path) -> None:
-    whole = (ARMS / "pincherx_150.urdf").read_text()
-    elbow = whole.index('<joint name="elbow"')
-    before, after = whole[:elbow], whole[elbow:]
-    tilt = math.radians(12.0)
-    skewed = f'<axis xyz="{math.sin(tilt)} {math.cos(tilt)} 0"/>'
-    path = tmp_path / "skewed.urdf"
-    path.write_text(before + re.sub(r'<axis xyz="[^"]*"/>', skewed, after, count=1))
-    reason = "axis 3 must be parallel to axis 2 and is 12 deg off"
-    described = find_robot(Settings(), path, None)
-    assert described.robot.arm is not None
-    assert f"The kinematics are numerical, because {reason}." in described.notes
-    described.session.check(cmd.Pose(np.eye(4)))
-    # Without the extension of such arms only its joints are driven.
-    joints = load(path)
-    assert joints.arm is None
-    assert reason in joints.why
-    assert joints.joint_group.why == joints.why
-    with pytest.raises(RobotDescriptionError, match="12 deg off"):
-        load(path, joints.links[-1].name)

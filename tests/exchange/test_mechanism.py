@@ -159,12 +159,6 @@ def test_an_invalid_description_is_refused(
         load(path).check_complete()
 
 
-def test_missing_mesh_is_reported(tmp_path: Path) -> None:
-    text = GANTRY.read_text()
-    other = load(edited(tmp_path, text, '<sphere radius="0.05"/>', '<mesh filename="no.stl"/>'))
-    assert "no.stl" in other.notes[0]
-
-
 def test_names_become_identifiers_and_stay_apart() -> None:
     names = distinct(["a b", "a_b", "A b", "for", "3d", "", "größe", "plain"], {"for"})
     assert names == ["a_b", "a_b_2", "A_b_3", "for_2", "n3d", "n", "gr__e", "plain"]

@@ -19,13 +19,9 @@ TABLE = {
 }
 
 
-def csv_of(table: dict[str, list[float]]) -> str:
-    rows = zip(*table.values(), strict=True)
-    return "\n".join([",".join(table), *(", ".join(map(repr, row)) for row in rows), ""])
-
-
 def test_a_table_is_a_motion(tmp_path: Path, katana: Robot) -> None:
-    (tmp_path / "a.csv").write_text(csv_of(TABLE))
+    rows = [", ".join(map(repr, row)) for row in zip(*TABLE.values(), strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join([",".join(TABLE), *rows, ""]))
     motion = load_motion(tmp_path / "a.csv", katana)
     np.testing.assert_array_equal(motion.t, [0.0, 1.0, 1.5])
     np.testing.assert_array_equal(motion.values["axis_1"], TABLE["theta1"])

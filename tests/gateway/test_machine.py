@@ -92,13 +92,6 @@ def test_its_vrml_world_has_names(program: Client, robot: Robot) -> None:
     )
 
 
-STOP = 0.005
-"""[m] Distance that stays to every obstacle."""
-
-SHORT = 0.03
-"""[m] Maximum length by which a brake ends earlier: late ticks begin it sooner."""
-
-
 @pytest.fixture(scope="module")
 def on_table(tmp_path_factory: pytest.TempPathFactory) -> DescribedRobot:
     path = tmp_path_factory.mktemp("column") / "column.urdf"
@@ -119,17 +112,6 @@ def column_arm(column_server: VirtualServer) -> Iterator[Client]:
         yield program
 
 
-def height(client: Client) -> float:
-    """Return the height of the underside of the beam over the table [m]."""
-    return client.query(answers.State).q[0] + 0.35 - 0.02
-
-
-def end(answer: object) -> answers.MotionEnd:
-    assert isinstance(answer, answers.Done)
-    assert answer.end is not None
-    return answer.end
-
-
 def place(
     client: Client,
     name: str = "block",
@@ -139,16 +121,6 @@ def place(
     """Place a box on the table."""
     T = se3.from_rotation_translation(np.eye(3), np.array((*position, -0.3)))
     client.ask(requests.Place(name=name, T=T, shape=requests.Shape.BOX, size=list(size)))
-
-
-def test_table_is_named_at_the_start_and_stops_a_joint(
-    on_table: DescribedRobot, column_arm: Client
-) -> None:
-    assert "The table is 300 mm below the base." in " ".join(on_table.notes)
-    outcome = end(column_arm.ask(requests.Joint(axis=1, value=-0.4, wait=30)))
-    assert outcome.how == "contact"
-    assert outcome.why.startswith("Beam and table are ")
-    assert STOP - 1e-7 <= height(column_arm) <= STOP + SHORT
 
 
 def test_object_is_attached_undone_and_saved_with_the_scene(

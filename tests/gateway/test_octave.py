@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from katana450.maths.kinematics.tool import ToolTarget
 from tests.browser.server import ROOT, AppServer
 from tests.commands import completed
 from tests.gateway import octave
+from tests.gateway.lines import Lines
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +27,8 @@ def octave_path() -> str:
 
 def output_of(octave_path: str, server: AppServer, script: str) -> dict[str, Any]:
     """Return the output of a script of examples/octave."""
-    match = re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)
-    assert match is not None
     command = [octave_path, "--quiet", "--path", str(ROOT / "examples" / "octave")]
-    done = completed([*command, "--eval", f"port = {match[1]}; {script}"], seconds=90)
+    done = completed([*command, "--eval", f"port = {Lines.port(server)}; {script}"], seconds=90)
     assert done.returncode == 0, done.stderr
     output: dict[str, Any] = json.loads(done.stdout.splitlines()[0])
     return output

@@ -139,12 +139,16 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
     for kind, several in samples.items():
         for request in several:
             if kind is requests.ClearStop:
-                wait_until_clearable(program)
+                while not program.query(answers.State).clearable:
+                    time.sleep(0.02)
             before = program.query(answers.State).ticket
             answer = done(program.ask(request))
             time.sleep(0.5)
             if kind is Program:
-                wait_until_planned(program)
+                while (progress := program.query(answers.State).program) is None or (
+                    progress.status != "ready"
+                ):
+                    time.sleep(0.02)
             if answer.outcome is None:
                 # Then the request became no command.
                 assert program.query(answers.State).ticket == before, request
@@ -159,16 +163,6 @@ def test_simulated_arm_has_nothing_to_operate(program: Client) -> None:
         program.ask(requests.OperateArm(act=ArmAct.CONNECT))
     with pytest.raises(InputError, match=r"^Motors off means the arm falls"):
         requests.RequestDecoder().decoded('{"do": "operate_arm", "act": "release"}')
-
-
-def wait_until_clearable(program: Client) -> None:
-    while not program.query(answers.State).clearable:
-        time.sleep(0.02)
-
-
-def wait_until_planned(program: Client) -> None:
-    while (progress := program.query(answers.State).program) is None or progress.status != "ready":
-        time.sleep(0.02)
 
 
 def test_partly_refused_batch_names_the_refused_parts(session: Session) -> None:

@@ -265,16 +265,12 @@ async def until_program(owner: Control, status: str) -> None:
             await asyncio.sleep(0.05)
 
 
-async def run_program(owner: Control) -> None:
+async def test_owner_of_a_running_program_decides_about_requests(local: VirtualServer) -> None:
+    owner, other = await local.control(), await local.control()
     await owner.say("program", text=WAVE)
     await until_program(owner, "ready")
     await owner.say("steer", order="run")
     await owner.wait(holder="Wave")
-
-
-async def test_owner_of_a_running_program_decides_about_requests(local: VirtualServer) -> None:
-    owner, other = await local.control(), await local.control()
-    await run_program(owner)
     await owner.wait(orders=["end"], pace="", planning=False, asking=[], own_program=True)
     assert not other.status["own_program"]
     await other.say("ask")

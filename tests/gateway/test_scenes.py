@@ -102,23 +102,6 @@ def test_server_starts_with_its_scene_and_objects(arm: Client) -> None:
     assert state.water.cup_ml == pytest.approx(80.0, abs=1e-9)
 
 
-def test_a_keep_out_zone_is_placed_and_changed(arm: Client) -> None:
-    size, box = [0.02, 0.4, 0.5], requests.Shape.BOX
-    arm.ask(requests.Place(name="door", shape=box, size=size, zone=requests.Zone.KEEP_OUT))
-    until(lambda: "door" in objects(arm))
-    assert objects(arm)["door"].zone == "keep_out"
-    for wrong in (
-        requests.Place(name="door", can_be_held=True),
-        requests.Attach(name="door", to=requests.Attachment.HAND),
-    ):
-        with pytest.raises(RefusedError, match="'door' is a zone"):
-            arm.ask(wrong)
-    arm.ask(requests.Place(name="door", zone=requests.Zone.NONE))
-    until(lambda: objects(arm)["door"].zone == "none")
-    arm.ask(requests.Remove(name="door"))
-    until(lambda: "door" not in objects(arm))
-
-
 def test_mesh_is_placed_fixed_to_the_hand_and_touched(
     arm: Client, ring: Path, robot: Robot
 ) -> None:

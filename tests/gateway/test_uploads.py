@@ -1,9 +1,10 @@
-"""Test uploads that drip, take long or are abandoned: they end, and others get their turn."""
+"""Test uploads that drip, take long or are abandoned, which end; and those of several files."""
 
 from __future__ import annotations
 
 import asyncio
 import io
+import json
 import socket
 import time
 import zipfile
@@ -23,7 +24,9 @@ from katana450.server.web import bodies
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.bodies import BODY_SECONDS, body_of
 from tests.browser.server import AppServer
+from tests.exchange.shape_bytes import zipped
 from tests.exchange.test_reading_time import star
+from tests.exchange.test_several_files import PARTS
 from tests.gateway.client import HOUR, ask
 from tests.gateway.site import open_site
 from tests.gateway.virtual import VirtualServer
@@ -128,6 +131,21 @@ def request_of(chunks: AsyncIterator[bytes]) -> Request:
         return {"type": "http.request", "body": b"", "more_body": False}
 
     return Request({"type": "http", "method": "POST", "headers": []}, receive)
+
+
+def test_one_file_of_a_zip_is_chosen(local: VirtualServer) -> None:
+    pair = zipped(dict.fromkeys(("a.wrl", "b.wrl"), PARTS["parts/x.wrl"]))
+
+    def upload(query: str) -> tuple[int, dict[str, Any]]:
+        status, _, body = local.ask(f"/api/v1/mesh?name=pair.zip{query}", data=pair)
+        return status, json.loads(body)
+
+    status, answer = upload("")
+    assert (status, answer["choices"]) == (422, ["a.wrl", "b.wrl"])
+    status, answer = upload("&main=b.wrl")
+    assert (status, answer["name"], answer["scale"]) == (200, "b", 1.0)
+    status, answer = upload("&main=..%2Fb.wrl")
+    assert (status, "no file '../b.wrl'" in answer["why"]) == (422, True)
 
 
 @pytest.mark.parametrize(("rate", "passes"), [(10_000.0, True), (2_000_000.0, False)])

@@ -5,10 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
-import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -29,25 +27,11 @@ expect:
 """
 
 
-@pytest.fixture
-def script(tmp_path: Path) -> Path:
-    path = tmp_path / "line.yaml"
-    path.write_text(SCRIPT, encoding="utf-8")
-    return path
-
-
-def command_done(*options: str, seconds: float = 120.0) -> subprocess.CompletedProcess[str]:
-    return completed([sys.executable, "-m", "katana450", *options], seconds=seconds)
-
-
-def report_in(folder: Path) -> dict[str, Any]:
-    report: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    return report
-
-
 def test_bound_on_a_measured_arm_needs_one(
-    script: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    script = tmp_path / "line.yaml"
+    script.write_text(SCRIPT, encoding="utf-8")
     assert main(["run", str(script), "--headless"]) == 1
     assert "measured_position_error_mm was not measured" in capsys.readouterr().err
     assert main(["run", str(script), "--headless", "--plant", "katana450"]) == 0
@@ -58,11 +42,10 @@ def test_bound_on_a_measured_arm_needs_one(
 
 @pytest.mark.long
 def test_circle_of_a_plant_has_commanded_and_measured_apart(tmp_path: Path) -> None:
-    done = command_done(
-        "demo", "circle", "--headless", "--plant", "katana450", "--report", str(tmp_path)
-    )
+    options = ("demo", "circle", "--headless", "--plant", "katana450", "--report", str(tmp_path))
+    done = completed([sys.executable, "-m", "katana450", *options], seconds=120.0)
     assert done.returncode == 0, done.stderr
-    report = report_in(tmp_path)
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert report["executed_position_error_mm"] < 1e-9
     assert report["bounds_held"]
     with (tmp_path / "trace.csv").open(encoding="utf-8") as file:
