@@ -362,10 +362,6 @@ class ViserPage:
         """Press the button with this text in the app's own page, around viser's."""
         self.page.get_by_role("button", name=label, exact=True).click()
 
-    def text_of(self, selector: str) -> str:
-        """Return the text of the first element for a CSS selector."""
-        return self.frame.locator(selector).first.inner_text()
-
     # Evidence
 
     def picture(self) -> NDArray[np.uint8]:

@@ -17,13 +17,9 @@ PHONE: dict[str, Any] = {"has_touch": True, "is_mobile": True}
 SCHEMES = ("light", "dark")
 
 
-def in_sizes_and_schemes(sizes: Iterable[str], *short: tuple[str, str]) -> pytest.MarkDecorator:
-    """Run a test with each `size` of ``sizes`` in each `scheme`.
-
-    Only the pairs in ``short`` are run by `make test`; the others take long together.
-    """
-    pairs = [(size, scheme) for size in sizes for scheme in SCHEMES]
-    return pytest.mark.parametrize(
-        ("size", "scheme"),
-        [pair if pair in short else pytest.param(*pair, marks=pytest.mark.long) for pair in pairs],
-    )
+def in_sizes_and_schemes(sizes: Iterable[str]) -> pytest.MarkDecorator:
+    """Run a test with each `size` of ``sizes`` in each `scheme`, which takes long."""
+    pairs = [
+        pytest.param(size, scheme, marks=pytest.mark.long) for size in sizes for scheme in SCHEMES
+    ]
+    return pytest.mark.parametrize(("size", "scheme"), pairs)

@@ -83,20 +83,8 @@ def findings(document: Page | Frame) -> Any:
 
 @pytest.mark.long
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_axe_finds_nothing_serious_on_page_and_panel(
-    server: AppServer, open_page: OpenPage, theme: str, artefacts: Path
-) -> None:
-    page = open_page(server.url, nodes=("/arm", MOVE), color_scheme=theme)
-    assert findings(page.page) == []
-    controls(page)
-    assert findings(page.frame) == []
-    page.keep(artefacts / f"panel-{theme}.png")
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("size", [WIDE, PORTRAIT])
-def test_axe_finds_nothing_serious_in_sheets_and_dialogs(
+def test_axe_finds_nothing_serious_in_panel_sheets_and_dialogs(
     server: AppServer,
     open_page: OpenPage,
     size: tuple[int, int],
@@ -116,6 +104,9 @@ def test_axe_finds_nothing_serious_in_sheets_and_dialogs(
     take(page)
     assert findings(page.page) == [], "first steps"
     page.page.get_by_role("button", name="Close for good").click()
+    if size == WIDE:
+        controls(page)
+        assert findings(page.frame) == [], "panel"
     for name, ready in (
         ("instruments", "#instruments:not([hidden]) canvas"),
         ("objects", "#objects:not([hidden])"),

@@ -48,12 +48,6 @@ def first_joint(truth: Truth) -> float:
     return math.degrees(truth.status()["q"][0])
 
 
-def wait_for_joint(page: ViserPage, truth: Truth, degrees: float) -> None:
-    page.wait_until(
-        lambda: abs(first_joint(truth) - degrees) < 1e-3, f"axis 1 at {degrees}", seconds=20.0
-    )
-
-
 def marked(box: Locator) -> bool:
     return box.get_attribute("aria-invalid") == "true"
 
@@ -78,7 +72,7 @@ def test_value_is_sent_on_enter_or_by_leaving_and_only_in_its_range(
     assert first_joint(truth) == page.slider_value("1 base turn") == home
     box.press("Enter")
     assert watch.sees(50)
-    wait_for_joint(page, truth, 50.0)
+    page.wait_until(lambda: abs(first_joint(truth) - 50.0) < 1e-3, "axis 1 at 50", seconds=20.0)
     type_slowly(page, box, "5-0")
     assert marked(box)
     box.press("Tab")

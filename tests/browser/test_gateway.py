@@ -15,7 +15,11 @@ def test_command_from_before_a_stop_moves_nothing_after_it(page: ViserPage, trut
     with page.grip_arrow(MOVE, "z") as grip:
         page.page.keyboard.press("Space")
         truth.wait(mood="stopped")
-        reset_by_key(page, truth)
+        # By a key, because the mouse is in use.
+        page.page.wait_for_selector("#clear-stop:not([hidden]):enabled")
+        page.page.focus("#clear-stop")
+        page.page.keyboard.press("Enter")
+        truth.wait(stopped=None)
         # The drag continues and moves nothing.
         grip.sweep(0.05, 5)
         page.page.wait_for_timeout(200)
@@ -26,14 +30,6 @@ def test_command_from_before_a_stop_moves_nothing_after_it(page: ViserPage, trut
     page.drag_arrow(MOVE, "z", 0.03)
     page.wait_until(lambda: page.slider_value("2 shoulder") != q[1], "a fresh drag to move it")
     page.click_button("Home")
-
-
-def reset_by_key(page: ViserPage, truth: Truth) -> None:
-    """Clear the stop by a key, because the mouse is in use."""
-    page.page.wait_for_selector("#clear-stop:not([hidden]):enabled")
-    page.page.focus("#clear-stop")
-    page.page.keyboard.press("Enter")
-    truth.wait(stopped=None)
 
 
 @pytest.mark.long

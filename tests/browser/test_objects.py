@@ -17,7 +17,7 @@ from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import MOVE, Truth, bar, clear_stop
+from tests.browser.session import bar
 from tests.exchange.compressed_gltf import DATA, SQUARE
 from tests.exchange.shape_bytes import zipped
 
@@ -297,43 +297,6 @@ def test_clicked_object_gets_arrows_that_move_it_in_this_window_alone(
     )
     page.page.get_by_role("button", name="Deselect").click()
     page.wait_until(lambda: not page.shows(arrows), "no arrows")
-
-
-FIND_LINK = """() => {
-    const { postMessage } = Worker.prototype;
-    Worker.prototype.postMessage = function (...message) {
-        window.link = this;
-        postMessage.apply(this, message);
-    };
-}"""
-"""Script that keeps the worker of the page, once the page sends it a message."""
-
-
-@pytest.mark.long
-def test_undo_names_the_stops_that_its_page_knows(page: ViserPage, truth: Truth) -> None:
-    """An undo that waits on its way while the arm is stopped and cleared is refused."""
-    page.press_in_bar("STOP")
-    truth.wait(mood="stopped")
-    clear_stop(page, truth)
-    start = np.array(truth.status()["goal"])
-    page.page.evaluate(FIND_LINK)
-    page.drag_arrow(MOVE, "y", 0.1)
-    truth.wait(10.0, moving=False)
-    moved = np.array(truth.status()["q"])
-    # The page shows an old status, and holds the drag for undoable, as while its connection hangs.
-    # The key is pressed at once, before the next status arrives.
-    page.page.evaluate(
-        """(old) => {
-            const heard = {is: "status", ...old};
-            link.dispatchEvent(new MessageEvent("message", {data: {heard}}));
-            document.body.dispatchEvent(new KeyboardEvent(
-                "keydown", {code: "KeyZ", key: "z", ctrlKey: true, bubbles: true}));
-        }""",
-        {"undo": ["arm (drag)"], "revocations": truth.status()["revocations"] - 1},
-    )
-    page.wait_until(lambda: "Do it again" in bar(page, "toast"), "the refusal")
-    assert np.allclose(truth.status()["q"], moved, atol=1e-6)
-    assert not np.allclose(moved, start, atol=1e-2)
 
 
 @pytest.mark.long

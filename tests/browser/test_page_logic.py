@@ -343,6 +343,28 @@ def test_elbow_of_seven_axes_moves_while_the_tool_rests(browser: Browser) -> Non
         assert page.evaluate("said.at(-1)") == pytest.approx(-0.174533, abs=1e-6)
 
 
+# Undo
+
+
+def test_undo_names_the_stops_that_the_page_knows(page: Page) -> None:
+    requests = module(
+        page,
+        "edit.js",
+        """({ begin, key }) => {
+            const [said, scene] = [[], document.createElement("iframe")];
+            const store = { up: true, follow: (note) => (store.note = note) };
+            begin({ store, scene, toast() {}, say: (each) => said.push(each) }, {});
+            for (const revocations of [7, 8]) {
+                store.note({ undo: ["arm (drag)"], revocations });
+                const pressed = { code: "KeyZ", key: "z", ctrlKey: true, target: document.body };
+                key({ type: "keydown", ...pressed });
+            }
+            return said;
+        }""",
+    )
+    assert requests == [{"do": "undo", "revocations": n, "id": "undo"} for n in (7, 8)]
+
+
 # Teach
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from katana450.client import Client, connect
+from katana450.client import connect
 from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
@@ -27,13 +26,6 @@ PLANNED = 60.0
 """Timeout [s] of a plan, on a busy machine."""
 
 
-def wait_plan(arm: Client, until: Callable[[answers.ProgramPlan], bool]) -> None:
-    due = time.monotonic() + PLANNED
-    while not until(arm.query(answers.ProgramPlan)):
-        assert time.monotonic() < due
-        time.sleep(0.05)
-
-
 def test_steps_of_a_program_are_controlled_in_the_list(
     server: AppServer, open_page: OpenPage, truth: Truth, artefacts: Path
 ) -> None:
@@ -48,7 +40,9 @@ def test_steps_of_a_program_are_controlled_in_the_list(
         # The scene shows the arm at a time of the preview.
         slider = page.page.get_by_role("slider", name="Look at the time of the preview")
         slider.fill("1")
-        wait_plan(reader, lambda plan: plan.look == 1.0 and plan.steps[-1].mark == "")
+        shown = partial(reader.query, answers.ProgramPlan)
+        page.wait_until(lambda: shown().look == 1.0, "the time of the preview", seconds=PLANNED)
+        assert shown().steps[-1].mark == ""
         page.wait_until(lambda: page.page.locator(".steps [aria-current]").count() == 1, "the step")
         assert "1.0 s of" in (slider.get_attribute("aria-valuetext") or "")
         pause = page.page.get_by_role("button", name="Pause before step 3", exact=True)

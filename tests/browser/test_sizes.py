@@ -185,24 +185,4 @@ def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
         page.keep(artefacts / "phone.png")
         sky = np.median(page.scene_picture()[5:15].reshape(-1, 3), axis=0)
         assert sky.max() < max(DARK.floor) + 30
-        # The panel is folded until a person opens it; the scene then gets the remaining height.
-        assert not in_view(page, "1 base turn")
-        page.frame.locator("#k450-sheet").tap()
-        page.wait_until(lambda: in_view(page, "1 base turn"), "the panel")
-        wait_whole(page, "above the panel")
-        page.keep(artefacts / "phone-panel.png")
-        page.page.tap("#jog-button")
-        wait_whole(page, "above the pads")
-        for key in page.page.locator("#jog kbd").all():
-            assert not key.is_visible()
-        page.keep(artefacts / "phone-jog.png")
         assert page.errors == []
-
-
-def in_view(page: ViserPage, text: str) -> bool:
-    """Return whether the text in viser's document is in the window."""
-    row = page.frame.get_by_text(text, exact=True).first
-    box = row.bounding_box() if row.is_visible() else None
-    size = page.page.viewport_size
-    assert size is not None
-    return box is not None and box["y"] + box["height"] < size["height"]

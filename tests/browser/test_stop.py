@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.browser.camera import Drawing
-from tests.browser.conftest import Windows
+from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import Truth, bar, clear_stop, mood
@@ -61,29 +61,23 @@ def test_clear_stop_is_disabled_with_the_reason_until_it_is_possible(
 
 
 def test_page_tells_a_requested_stop_from_a_confirmed_one(
-    page: ViserPage, server: AppServer, windows: Windows, artefacts: Path
+    page: ViserPage, server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:
-    with windows.open(server.url, drawing=Drawing.NONE) as other:
-        assert_stop_is_told(page, other, server, artefacts)
-
-
-def assert_stop_is_told(
-    driver: ViserPage, other: ViserPage, server: AppServer, artefacts: Path
-) -> None:
+    driver, other = page, open_page(server.url, drawing=Drawing.NONE)
     me = bar(driver, "name").partition(",")[0]
     with server.frozen(server.arm):
         wait_headline(other, "No answer from the arm")
         assert mood(other.page) == "lost"
         other.page.keyboard.press("Space")
-        for page in (driver, other):
-            wait_headline(page, "Stop requested")
-            assert mood(page.page) == "stopped"
-            assert "The arm has not confirmed the stop." in bar(page, "why")
+        for window in (driver, other):
+            wait_headline(window, "Stop requested")
+            assert mood(window.page) == "stopped"
+            assert "The arm has not confirmed the stop." in bar(window, "why")
         assert other.page.locator("#stop.asked").count() == 1
         other.keep(artefacts / "stop-requested.png")
-    for page in (driver, other):
-        wait_headline(page, "Stopped")
-        assert mood(page.page) == "stopped"
+    for window in (driver, other):
+        wait_headline(window, "Stopped")
+        assert mood(window.page) == "stopped"
     assert other.page.locator("#stop.asked").count() == 0
     # Clear stop is offered only to a person who may use it; the other page names that person.
     assert offers_clear_stop(driver)

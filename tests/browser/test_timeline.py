@@ -99,9 +99,9 @@ def shown_turn(page: ViserPage, root: str = GHOST) -> float:
     return float(np.arctan2(R[1, 0], R[0, 0]))
 
 
-def place(page: ViserPage, value: float) -> None:
-    """Move the slider of ``page`` to ``value`` [s], as a person's drag does."""
-    page.page.get_by_label(NOW).evaluate(
+def place(page: ViserPage, value: float, name: str = NOW) -> None:
+    """Move the slider ``name`` of ``page`` to ``value`` [s], as a person's drag does."""
+    page.page.get_by_label(name).evaluate(
         "(each, value) => { each.value = value; each.dispatchEvent(new Event('input')); }", value
     )
 
@@ -251,10 +251,7 @@ def test_selection_is_saved_opened_and_compared(
     length = float(page.page.get_by_label(NOW).get_attribute("max") or 0.0)
     ends = {"Start of the selection": length - 1.9, "End of the selection": length - 0.4}
     for name, value in ends.items():
-        page.page.get_by_label(name).evaluate(
-            "(each, value) => { each.value = value; each.dispatchEvent(new Event('input')); }",
-            value,
-        )
+        place(page, value, name)
     with page.page.expect_download() as downloading:
         page.press_in_bar("Save selection")
     path = tmp_path / "part.mcap"
@@ -316,7 +313,6 @@ def test_selection_is_saved_opened_and_compared(
     page.page.locator("#toast", has_text="not a recording").wait_for()
 
 
-@pytest.mark.long
 @in_sizes_and_schemes(("wide", "portrait", "landscape"))
 def test_timeline_covers_nothing(
     server: AppServer, open_page: OpenPage, artefacts: Path, size: str, scheme: str

@@ -11,10 +11,8 @@ from playwright.sync_api import Page, expect
 from katana450.client import Client, connect
 from katana450.maths.geometry import se3
 from katana450.server.api import answers, requests
-from tests.browser.camera import Drawing
-from tests.browser.conftest import Windows
+from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.sizes import WIDE
 
 OPEN, CLOSED = 0.3, -0.44
 ROD, ROD_AT = [0.015, 0.31], (0.4477, 0.0)
@@ -40,17 +38,9 @@ def grip(arm: Client, angle: float) -> None:
     arm.go(requests.Gripper(angle=angle))
 
 
-@pytest.fixture
-def page(server: AppServer, arm: Client, windows: Windows) -> Iterator[Page]:
-    """Return our own page without viser in its frame."""
-    grip(arm, CLOSED)
-    with windows.open(server.url, window=WIDE, drawing=Drawing.NONE) as page:
-        yield page.page
-        assert page.errors == []
-
-
 @pytest.mark.long
-def test_gauge_and_plot_show_the_force_of_each_finger(page: Page, arm: Client) -> None:
+def test_gauge_and_plot_show_the_force_of_each_finger(own_window: ViserPage, arm: Client) -> None:
+    page = own_window.page
     touch = arm.query(answers.State).touch
     assert touch is not None
     forces = [finger.force for finger in touch.fingers]
@@ -61,6 +51,7 @@ def test_gauge_and_plot_show_the_force_of_each_finger(page: Page, arm: Client) -
     check_shown(page, [("finger right", forces[0]), ("finger left", forces[1])], "holds rod")
     grip(arm, OPEN)
     check_shown(page, [("finger right", 0.0), ("finger left", 0.0)], "empty hand")
+    assert own_window.errors == []
 
 
 def check_shown(page: Page, forces: list[tuple[str, float]], held: str) -> None:
