@@ -149,6 +149,7 @@ def ghost_is_shown(robot: Robot) -> bool:
     return bool(last.body["visible"])
 
 
+@pytest.mark.long
 def test_arm_stops_before_the_table_with_reason_and_distance(
     robot: Robot, truth: Truth, artefacts: Path
 ) -> None:

@@ -77,7 +77,7 @@ EDITS = """async ([path, text, blocks]) => {
 """Returns all edits of all blocks."""
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["choose.yaml", "star.yaml", "boxes.yaml", "half.yaml"])
 def test_edits_keep_every_other_line_and_the_structure(browser: Browser, name: str) -> None:
     text = SCRIPTS[name]

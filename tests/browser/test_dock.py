@@ -99,6 +99,7 @@ def test_side_width_and_open_sheets_survive_a_reload(alone: Page) -> None:
     assert box(alone, "#stage")["x"] == 0.0
 
 
+@pytest.mark.long
 def test_keys_change_the_width_within_its_limits(alone: Page) -> None:
     alone.click("#jog-button")
     edge(alone)

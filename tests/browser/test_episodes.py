@@ -210,6 +210,7 @@ def test_windows_agree_and_a_reload_keeps_rec(
     assert first.errors == second.errors == []
 
 
+@pytest.mark.long
 def test_episodes_are_open_again_without_taking_the_keys(
     recording_server: AppServer, open_page: OpenPage
 ) -> None:

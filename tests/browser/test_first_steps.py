@@ -85,6 +85,7 @@ def test_unasked_drag_counts_and_question_mark_opens_the_help(
     assert visit.errors == []
 
 
+@pytest.mark.long
 def test_page_that_cannot_draw_says_so(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, drawing=Drawing.NONE, script=BLIND).page
     expect(page.locator("#poster")).to_contain_text("WebGL 2 is off or missing", timeout=20_000)
@@ -130,6 +131,7 @@ def test_card_is_dismissed_for_good_and_returns_by_the_help(visit: ViserPage) ->
     window.wait_for_selector("#welcome:not([hidden])")
 
 
+@pytest.mark.long
 def test_card_lies_over_no_sheet_of_a_phone(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, window=PORTRAIT, script=FIRST_VISIT, **PHONE)
     card = page.page.locator("#welcome")

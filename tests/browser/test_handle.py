@@ -91,6 +91,7 @@ def test_label_says_how_near_the_nearest_part_is(
         page.keep(artefacts / "handle-near.png")
 
 
+@pytest.mark.long
 def test_control_snaps_and_shift_slows_a_drag(page: ViserPage, truth: Truth) -> None:
     def height() -> float:
         truth.wait(20.0, moving=False)

@@ -103,6 +103,7 @@ def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -
     page.wait_until(lambda: truth.status()["speed"] == 1.0, "the speed")
 
 
+@pytest.mark.long
 def test_knob_of_a_spectator_springs_back_with_the_reason(
     page: ViserPage, server: AppServer, truth: Truth
 ) -> None:

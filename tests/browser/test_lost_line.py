@@ -111,6 +111,7 @@ def test_first_drag_after_a_rest_does_not_stop_on_a_slow_connection(attentive: A
     wait_answered(page)
 
 
+@pytest.mark.long
 def test_silent_connection_is_reported_and_the_arm_stops(attentive: Attentive) -> None:
     page, truth, line = attentive
     page.type_number("1 base turn", -150.0)

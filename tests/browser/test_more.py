@@ -62,6 +62,7 @@ def test_person_chooses_a_name_and_saves_picture_and_link(
 
 
 @pytest.mark.skipif(own_address() is None, reason="this machine is in no network")
+@pytest.mark.long
 def test_code_of_a_server_of_one_machine_is_the_command_that_opens_it(own_page: ViserPage) -> None:
     page = own_page.page
     page.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text }")

@@ -218,6 +218,7 @@ def test_chosen_object_is_edited_in_the_sheet(page: ViserPage, reader: Client) -
     page.wait_until(lambda: objects(reader).keys() == before, "it to go")
 
 
+@pytest.mark.long
 def test_zone_is_added_in_the_sheet(page: ViserPage, reader: Client, artefacts: Path) -> None:
     page.press_in_bar("Objects")
     page.page.get_by_role("button", name="Add zone").click()

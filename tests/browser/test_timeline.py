@@ -175,6 +175,7 @@ def test_past_is_shown_in_one_window_until_stop(
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_line_grows_under_the_pointer_and_plays_only_while_it_says_so(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:
