@@ -111,8 +111,10 @@ export class Bar {
     const [name, step, steps] = status.continues;
     const controls = status.orders.map((order) => {
       const resumes = order === "continue";
-      const control = button(resumes ? `Continue ${name}` : status.planning ? "Cancel" : "End", () => this.#page.say({ do: "steer", order }));
+      const other = order === "rewind" ? "Rewind" : status.planning ? "Cancel" : "End";
+      const control = button(resumes ? `Continue ${name}` : other, () => this.#page.say({ do: "steer", order }));
       if (resumes) Object.assign(control, { className: "main", title: `Continue ${name} at step ${step} of ${steps}` });
+      if (order === "rewind") control.title = "Set arm and objects back to where you took over";
       return control;
     });
     replaceKeepingFocus(orders, controls);

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from katana450.client import connect
@@ -93,6 +94,14 @@ def test_handle_that_is_dragged_takes_over_from_the_program(
         truth.wait(moving=False)
         page.wait_until(lambda: "took over" in says(page), "the reason")
         page.keep(artefacts / "taken_over.png")
+        # The drag has turned axes 2 to 4, which the program leaves as they are.
+        assert np.abs(np.degrees(truth.status()["q"][1:4]) - (-40, 60, 30)).max() > 1.0
+        page.press_in_bar("Rewind")
+        page.wait_until(
+            lambda: np.abs(np.degrees(truth.status()["q"][1:4]) - (-40, 60, 30)).max() < 0.1,
+            "the posture in which the drag began",
+        )
+        truth.wait(moving=False)
         page.page.get_by_role("button", name="Continue ").click()
         wait_progress(reader, lambda run: run.status == "running")
         page.press_in_bar("End")

@@ -181,7 +181,7 @@ def test_owner_takes_over_by_moving_the_arm(table: Staged, move: cmd.Command) ->
     table.run(owner)
     table.wait(0.1, owner)
     began = owner.actor
-    holds = table.arm.holds
+    holds, session = table.arm.holds, table.arm.session
     for participant, command, reason in (
         (other, move, "Wave holds the arm"),
         # Neither a lost key nor the gripper takes over.
@@ -190,14 +190,24 @@ def test_owner_takes_over_by_moving_the_arm(table: Staged, move: cmd.Command) ->
     ):
         with pytest.raises(LeaseError, match=reason):
             table.hub.move(participant, command)
+    with pytest.raises(LeaseError, match="Nobody has taken over"):
+        table.programs.steer(owner, ProgramOrder.REWIND)
     table.hub.move(owner, move)
+    table.arm.rest = session.begin(session.ready + 0.05, 0.0, 0.0)
     # The gesture continues, and the arm is not braked.
     table.hub.gate.submit(move, replace(began, seen=table.hub.gate.revocations))
     table.wait(0.1, owner)
     assert (table.status, table.arm.holds) == ("stopped", holds)
     assert table.hub.lease.holder == owner.person
     assert table.bar(owner)["why"].startswith("You took over at step 1 of 2. Continue resumes")
-    assert ProgramOrder.CONTINUE.value in table.programs.orders(owner)
+    assert table.programs.orders(owner) == ("continue", "rewind")
+    with pytest.raises(LeaseError, match="belongs to Window 1"):
+        table.programs.steer(other, ProgramOrder.REWIND)
+    table.programs.steer(owner, ProgramOrder.REWIND)
+    restored = table.arm.commands[-1]
+    assert isinstance(restored, cmd.RestoreState)
+    np.testing.assert_array_equal(restored.state.setpoint, session.ready)
+    assert table.arm.holds == holds + 1
 
 
 def test_handle_is_grabbed_before_its_first_command_takes_over(table: Staged) -> None:

@@ -113,7 +113,7 @@ declare namespace Api {
   type Priority = "orientation" | "pose" | "position" | "position and pitch";
   interface Program { do: "program"; id?: number | string | null; revocations?: number | null; made?: number | null;
     text: string; more?: boolean; speed?: number; }
-  type ProgramOrder = "continue" | "end" | "pause" | "resume" | "run" | "step";
+  type ProgramOrder = "continue" | "end" | "pause" | "resume" | "rewind" | "run" | "step";
   interface ProgramPlan { is: "program_plan"; id?: number | string | null; text?: string; program?: Progress | null;
     steps?: ProgramStep[]; seconds?: number; look?: number; }
   interface ProgramStep { name: string; seconds: number; mark: string; predicted: boolean; line: number; column: number;

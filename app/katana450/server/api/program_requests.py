@@ -29,6 +29,8 @@ class ProgramOrder(Enum):
     """Bring the arm to rest and end the program."""
     CONTINUE = "continue"
     """Continue a program that has ended early, from where the arm stands."""
+    REWIND = "rewind"
+    """Set a simulated arm and its scene back to where its owner took over, and hold there."""
 
 
 class Program(Request, frozen=True, kw_only=True):
@@ -51,7 +53,7 @@ class Program(Request, frozen=True, kw_only=True):
 
 
 class Steer(MotionRequest, frozen=True, kw_only=True):
-    """Run, step, pause, resume, end or continue the planned program.
+    """Run, step, pause, resume, end, continue or rewind the planned program.
 
     A program drives as a participant of its own, and its owner must stay connected. During
     planning, ``run`` and ``step`` take effect afterwards, unless the arm is commanded to move, hold
@@ -64,7 +66,8 @@ class Steer(MotionRequest, frozen=True, kw_only=True):
     that runs is ended first; its arm must be at rest. ``continue`` resumes a program that was
     stopped, ended or failed, at the place of its path where the arm left it, after a motion back to
     the path if the arm has been moved. It chooses the tool frame of the run again, and is refused
-    if the gripper or the scene has changed.
+    if the gripper or the scene has changed. ``rewind`` undoes all that has happened since the
+    owner took over by moving the arm: posture, objects and water; then ``continue`` is possible.
     """
 
     traits: ClassVar[Traits] = Traits(extension=True)

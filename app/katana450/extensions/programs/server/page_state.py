@@ -132,16 +132,18 @@ def duration(seconds: float) -> str:
     return f"{whole} s" if whole < 100 else f"{whole // 60} min {whole % 60} s"
 
 
-def orders(program: Progress | None, *, may_begin: bool) -> tuple[str, ...]:
+def orders(program: Progress | None, *, may_begin: bool, rewinds: bool) -> tuple[str, ...]:
     """Return the orders that the page offers to the owner of ``program``.
 
-    ``may_begin``: whether the arm is not stopped, and free for the owner.
+    ``may_begin``: whether the arm is not stopped, and free for the owner. ``rewinds``: whether the
+    owner has taken over.
     """
     if program is None:
         return ()
     if program.status in (PlanningPhase.PLANNING.value, *RUNS):
         return (ProgramOrder.END.value,)
-    return (ProgramOrder.CONTINUE.value,) if program.can_continue and may_begin else ()
+    offered = {ProgramOrder.CONTINUE: program.can_continue, ProgramOrder.REWIND: rewinds}
+    return tuple(order.value for order, is_offered in offered.items() if may_begin and is_offered)
 
 
 SHOWN = "shown"

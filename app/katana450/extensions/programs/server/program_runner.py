@@ -63,6 +63,9 @@ class ProgramRunner(Runner):
         self._owner = ProgramOwner(hub, options.owner_silence)
         self.planner = ProgramPlanner(hub, self._owner)
         self._interruption: Interruption | None = None
+        # The newest state that the program has reached, and that of a takeover.
+        self._reached: State | None = None
+        self._taken_over: State | None = None
         self._left_tool: LeftTool | None = None
         self._is_news = False  # Whether no other command followed the end of a run or planning.
         self._runs_as: ProgramParticipant | None = None
@@ -133,7 +136,7 @@ class ProgramRunner(Runner):
         if self.planner.script(participant, text, more=more, speed=speed):
             self._run, self._is_news = None, True
             if self.planner.text != before:
-                self._interruption = None
+                self._interruption = self._taken_over = None
 
     def set_breakpoints(self, participant: Participant, steps: Sequence[int]) -> None:
         """Make the present program pause before ``steps``, from 1. Raises LeaseError."""
@@ -152,6 +155,8 @@ class ProgramRunner(Runner):
         Returns the ticket of the command that the arm was given now; None for none.
         """
         check_may_drive(participant.person)
+        if order is ProgramOrder.REWIND:
+            return self._rewind(participant)
         plans = order is ProgramOrder.CONTINUE or step is not None
         begins = order in PLANNED_ORDERS and (plans or not self.running)
         if step is not None and order not in (ProgramOrder.RUN, ProgramOrder.STEP):
@@ -183,8 +188,8 @@ class ProgramRunner(Runner):
                 return self._runs_as.send(cmd.Pause())
             case ProgramOrder.END:
                 return self._end(f"{participant.person.name} ended it.")
-            case ProgramOrder.CONTINUE:
-                raise AssertionError("`continue` was handled above.")
+            case ProgramOrder.CONTINUE | ProgramOrder.REWIND:
+                raise AssertionError("It was handled above.")
 
     def stopped(self) -> None:
         """Cancel a run that waits for its planning, after STOP."""
@@ -231,7 +236,7 @@ class ProgramRunner(Runner):
         if not self._runs_as.drives:
             reason = "The lease was taken from the program."
             if (holder := hub.lease.holder) is not None and self._owner.is_person(holder):
-                reason = f"{holder.name} took over."
+                reason, self._taken_over = f"{holder.name} took over.", self._reached
             self._leave_with(runner.ended(self._run, Phase.STOPPED, reason))
             return
         owner = self._owner.participant
@@ -244,6 +249,7 @@ class ProgramRunner(Runner):
             return
         arm = hub.arm
         if arm is not None and arm.caught_up:
+            self._reached = arm.state
             self._runs_as.follow(arm.state, t)
             run, commands = runner.step(program, self._run, arm.state, t)
             try:
@@ -319,7 +325,8 @@ class ProgramRunner(Runner):
         if not self.owns(participant):
             return ()
         free = self.hub.stopped is None and self.hub.lease.holder in (None, participant.person)
-        return page_state.orders(self.progress(), may_begin=free)
+        rewinds = self._taken_over is not None
+        return page_state.orders(self.progress(), may_begin=free, rewinds=rewinds)
 
     def _start_planned(self) -> None:
         """Carry out the order that waits for the end of the planning."""
@@ -362,6 +369,14 @@ class ProgramRunner(Runner):
             )
         self._run, self.planner.then = None, order
 
+    def _rewind(self, participant: Participant) -> int:
+        """Restore the state in which the owner took over, and hold the arm there."""
+        if self._taken_over is None or self.running:
+            raise LeaseError("Nobody has taken over from this program.")
+        self._owner.check_may_steer(participant.person)
+        self.hub.move(participant, cmd.RestoreState(self._taken_over))
+        return self.hub.move(participant, cmd.Hold())
+
     def _begin(self, participant: Participant, order: ProgramOrder) -> int | None:
         """Run the planned program. If the situation has changed, plan it again first."""
         planning = self.planner.require()
@@ -384,7 +399,7 @@ class ProgramRunner(Runner):
         follow = partial(self.follow_run, program.name, planning.text)
         self._runs_as = ProgramParticipant(self.hub, program.name, participant, follow)
         self._owner.change_to(participant, began)
-        self._interruption = self._left_tool = None
+        self._interruption = self._left_tool = self._taken_over = None
         self._run = replace(
             planning.continues or Run(began),
             t=began,
