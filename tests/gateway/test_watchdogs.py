@@ -21,7 +21,7 @@ from katana450.client import Client, connect
 from katana450.client.files import LostError, RefusedError
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
-from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
+from tests.browser.server import APP, ATTENTIVE_APP, AppServer, ServerError
 from tests.gateway.client import ask, healthy, state_of
 from tests.gateway.postures import FAR
 from tests.waiting import until
@@ -44,7 +44,7 @@ FATES = [
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[AppServer]:
-    with AppServer(ATTENTIVE_APP) as server:
+    with AppServer(APP) as server:
         yield server
 
 
