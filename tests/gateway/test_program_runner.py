@@ -182,14 +182,15 @@ def test_owner_takes_over_by_moving_the_arm(table: Staged, move: cmd.Command) ->
     table.wait(0.1, owner)
     began = owner.actor
     holds, session = table.arm.holds, table.arm.session
-    for participant, command, reason in (
-        (other, move, "Wave holds the arm"),
-        # Neither a lost key nor the gripper takes over.
-        (owner, cmd.Jog(np.zeros(5)), "Wave holds the arm"),
-        (owner, cmd.Gripper(0.3), "Wave holds the arm"),
+    for actor, command in (
+        (other.actor, move),
+        # Neither a lost key nor the gripper takes over, and no program of the API.
+        (began, cmd.Jog(np.zeros(5))),
+        (began, cmd.Gripper(0.3)),
+        (replace(began, channel=CommandChannel.TCP), move),
     ):
-        with pytest.raises(LeaseError, match=reason):
-            table.hub.move(participant, command)
+        with pytest.raises(LeaseError, match="Wave holds the arm"):
+            table.hub.gate.submit(command, actor)
     with pytest.raises(LeaseError, match="Nobody has taken over"):
         table.programs.steer(owner, ProgramOrder.REWIND)
     table.hub.move(owner, move)
@@ -221,15 +222,6 @@ def test_handle_is_grabbed_before_its_first_command_takes_over(table: Staged) ->
     table.hub.gate.submit(cmd.Joint(1, 0.2), claimed)
     table.wait(0.1, owner)
     assert (table.status, table.hub.gate.is_current(claimed)) == ("stopped", True)
-
-
-def test_program_of_the_api_cannot_take_over_from_a_script(table: Staged) -> None:
-    owner = table.join(PAGES[0])
-    table.run(owner)
-    by_api = replace(owner.actor, channel=CommandChannel.TCP)
-    with pytest.raises(LeaseError, match="Wave holds the arm"):
-        table.hub.gate.submit(cmd.Joint(1, 0.2), by_api)
-    assert table.programs.running
 
 
 def test_run_from_before_a_stop_is_not_executed_after_it(table: Staged) -> None:

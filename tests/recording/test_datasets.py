@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +13,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.runtime.tick import TickRecord
+from katana450.arm.control.lease import CommandChannel
+from katana450.arm.runtime.tick import Submission, TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
+from katana450.extensions.recording.datasets.lerobot_export import driven_by_person
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.table import RecordedStates, columns, frame_times, sampled
 from katana450.extensions.recording.folders import new_folder
 from katana450.maths.geometry.arrays import FloatArray
 from tests.recording.dataset_files import episode, episode_folder, write_copy
 from tests.recording.lerobot_check import check_dataset, episodes_of, rows_of
-from tests.recording.recorded import described
+from tests.recording.recorded import ADA, described, dragging, header, run
 
 FPS = 25
 OUTCOMES = {"success": 3, "failure": 4, "unjudged": 6, "unfinished": 8}
@@ -83,6 +87,29 @@ def test_folder_of_episodes_is_a_dataset(
     assert {episode["tasks"][0] for episode in rows} == {"pour the water"}
     assert [episode["length"] for episode in rows] == [1 + int(0.85 * FPS), 1 + int(0.95 * FPS)]
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+def test_frames_tell_whether_a_person_drove(tmp_path: Path) -> None:
+    path, ticks, script = tmp_path / "run.mcap", 60, replace(ADA, channel=CommandChannel.PROGRAM)
+    times: list[float] = []
+    with path.open("wb") as file:
+        writer = RecordingWriter(file, header())
+
+        def take(record: TickRecord) -> None:
+            giver = script if len(times) < ticks // 2 else ADA
+            times.append(record.t)
+            named = tuple(Submission(command, giver) for command, _ in record.submissions)
+            writer.put(record._replace(submissions=named))
+
+        run(ticks, 1, take, dragging, odd=False)
+        writer.close()
+    with RecordingFile.open(path) as recording:
+        people = driven_by_person(recording, np.array(times))
+    assert people[0] == 0.0
+    changes = np.flatnonzero(np.diff(people.astype(int)))
+    # At the first command of the person, not later than three ticks after the middle.
+    assert len(changes) == 1
+    assert ticks // 2 - 1 <= changes[0] < ticks // 2 + 3
 
 
 def test_outcomes_are_chosen(episodes: Path, tmp_path: Path) -> None:

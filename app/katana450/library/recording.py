@@ -17,13 +17,13 @@ from katana450.extensions.recording.episodes.episode_folder import episodes_in
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.simulation import (
-    TickReader,
     content_of,
+    given_commands,
     session_for,
     verified,
 )
 from katana450.extensions.recording.files.table import columns
-from katana450.extensions.recording.messages import COMMANDS, EVENTS, PLANS, SOLIDS, TickMessage
+from katana450.extensions.recording.messages import EVENTS
 from katana450.extensions.recording.run_again import script_of_part
 from katana450.extensions.recording.ticks import Verification
 from katana450.maths.geometry.arrays import FloatArray
@@ -134,18 +134,12 @@ class Recording:
     @cached_property
     def commands(self) -> tuple[RecordedCommand, ...]:
         """All commands in order, with their times and who gave them. Raises InputError."""
-        reader, commands = TickReader(), []
         with RecordingFile.open(self.path) as file:
-            for message in file.messages(PLANS, SOLIDS, COMMANDS):
-                if message.topic != COMMANDS:
-                    reader.add_shared(message)
-                    continue
-                tick = reader.tick(message)
-                if not isinstance(tick, TickMessage) and tick.t >= self.start:
-                    for submission in tick.submissions:
-                        giver = "" if submission.actor is None else submission.actor.name
-                        commands.append(RecordedCommand(tick.t, submission.command, giver))
-        return tuple(commands)
+            return tuple(
+                RecordedCommand(t, command, "" if actor is None else actor.name)
+                for t, (command, actor) in given_commands(file)
+                if t >= self.start
+            )
 
     @cached_property
     def events(self) -> tuple[Mapping[str, Any], ...]:

@@ -33,14 +33,11 @@ from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.links import DHLinks, links_of
 from katana450.maths.geometry import se3, so3
-from katana450.maths.geometry.arrays import FloatArray, IntArray, finite_array
+from katana450.maths.geometry.arrays import BoolArray, FloatArray, IntArray, finite_array
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import Kinematics
-
-BoolArray = npt.NDArray[np.bool]
-"""An array of truth values."""
 
 ARM_ANGLES: Final = 16
 """Number of arm angles of seven axes that are tried for a pose."""

@@ -10,6 +10,7 @@ from katana450.errors import InputError
 _HINT = "give plain finite numbers"
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 
 

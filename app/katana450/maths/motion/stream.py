@@ -16,9 +16,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.arrays import BoolArray, FloatArray, frozen
 from katana450.maths.motion.limiter import MIN_SPEED_FRACTION, JointMotion, Limiter, Limits
 
 READ_DELAY = 0.02
@@ -194,8 +193,6 @@ def _fitted(times: FloatArray, q: FloatArray, qd: FloatArray | None) -> FloatArr
     coefficients = np.linalg.lstsq(rows[:, :degree], values, rcond=None)[0]
     return np.concatenate((coefficients, np.zeros((3 - degree, q.shape[1]))))
 
-
-BoolArray = npt.NDArray[np.bool_]
 
 POSITION_GAIN, RATE_GAIN, ACCELERATION_GAIN = 8.0, 16.0, 48.0
 """Gains [1/s] for errors of position, rate and acceleration."""

@@ -9,18 +9,15 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from katana450.maths.collision.engine import KINDS, hull_triangles
 from katana450.maths.collision.linkage import GROUND, Linkage
 from katana450.maths.collision.shape import CollisionShape
 from katana450.maths.collision.world import Part
 from katana450.maths.geometry import so3
-from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.arrays import BoolArray, FloatArray, frozen
 from katana450.maths.physics.joint import BodyJoint
 from katana450.maths.water.units import GRAVITY
-
-BoolArray = npt.NDArray[np.bool_]
 
 REST_TIME = 0.25
 """[s] Time for which a body must be slow until it counts as at rest."""

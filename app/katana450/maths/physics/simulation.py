@@ -17,7 +17,7 @@ from katana450.maths.collision.engine import addresses, library
 from katana450.maths.collision.linkage import Linkage
 from katana450.maths.collision.world import Part
 from katana450.maths.geometry import se3, so3
-from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.arrays import BoolArray, FloatArray, frozen
 from katana450.maths.physics.model import (
     BODY,
     LINK,
@@ -26,7 +26,6 @@ from katana450.maths.physics.model import (
     SLIP_STEPS,
     STEP,
     BodyMotion,
-    BoolArray,
     FingerContact,
     FingerDrive,
     RigidBody,

@@ -14,8 +14,7 @@ from katana450.arm.control.state.scene_objects import SceneObject, Zone
 from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.maths.collision.clearance import path_lengths
 from katana450.maths.collision.world import CollisionWorld
-from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.physics.model import BoolArray
+from katana450.maths.geometry.arrays import BoolArray, FloatArray
 from katana450.maths.planning.plan import Plan
 
 SLOW_SPEED = 0.25

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
@@ -28,7 +29,7 @@ from katana450.extensions.recording.datasets.lerobot_writer import (
 from katana450.extensions.recording.episodes.episode import JUDGED, EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_folder import episodes_in
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.simulation import check_whole
+from katana450.extensions.recording.files.simulation import check_whole, given_commands
 from katana450.extensions.recording.files.table import (
     RecordedStates,
     check_fps,
@@ -37,7 +38,7 @@ from katana450.extensions.recording.files.table import (
     sampled,
 )
 from katana450.extensions.recording.folders import new_folder
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import BoolArray, FloatArray
 
 CRF = 18
 """Quality of the encoding, from 0 (exact) to 51."""
@@ -258,12 +259,16 @@ class Exported:
 
 @dataclass(frozen=True, eq=False)
 class _Episode:
-    """An episode on its grid of frames: times (N,) [s], states and actions (N, n) [rad or m]."""
+    """An episode on its grid of frames: times (N,) [s], states and actions (N, n) [rad or m].
+
+    ``by_person`` (N,) tells whether a person drove the arm.
+    """
 
     cut: EpisodeCut
     times: FloatArray
     state: FloatArray
     action: FloatArray
+    by_person: BoolArray
     gripper: bool
 
 
@@ -319,7 +324,8 @@ def export_lerobot(
                 row, statistics[feature] = video.end_episode()
                 columns.update(row)
             task, success = episode.cut.task, episode.cut.success
-            writer.add_episode(episode.state, episode.action, task, success, columns, statistics)
+            frames = episode.state, episode.action, episode.by_person
+            writer.add_episode(*frames, task, success, columns, statistics)
         # The last step of the progress.
         next(pictures, None)
         for video in videos:
@@ -357,7 +363,8 @@ def _cuts(paths: Sequence[Path], options: LerobotOptions) -> tuple[list[EpisodeC
 def _sampled_episode(cut: EpisodeCut, fps: int) -> _Episode:
     with RecordingFile.open(cut.path) as file:
         table = columns_from(file, cut.start, cut.end)
-    times = frame_times(cut.start, cut.end, fps)
+        times = frame_times(cut.start, cut.end, fps)
+        by_person = driven_by_person(file, times)
     # The action of a frame is the setpoint of the next one: that of the same time would be the
     # state itself where a driver follows without delay.
     later = np.minimum(times + 1.0 / fps, cut.end)
@@ -367,7 +374,29 @@ def _sampled_episode(cut: EpisodeCut, fps: int) -> _Episode:
     if gripper:
         state.append(sampled(table["t"], table["gripper"], times)[:, None])
         action.append(sampled(table["t"], table["gripper_setpoint"], later)[:, None])
-    return _Episode(cut, times, np.hstack(state), np.hstack(action), gripper)
+    return _Episode(cut, times, np.hstack(state), np.hstack(action), by_person, gripper)
+
+
+BY_HAND = (CommandChannel.PAGE, CommandChannel.SCENE)
+"""Channels of persons. Scripts have another one, and so have programs of the API."""
+
+
+def driven_by_person(file: RecordingFile, times: FloatArray) -> BoolArray:
+    """Return whether a person at a page gave the newest motion at each of ``times`` (N,) [s].
+
+    Before the first motion of the recording, that one counts. Raises InputError.
+    """
+    givers = [
+        (t, actor.channel in BY_HAND)
+        for t, (command, actor) in given_commands(file, end=float(times[-1]))
+        if actor is not None
+        and any(part.traits.supersedes and not part.traits.protective for part in command.parts)
+    ]
+    if not givers:
+        return np.zeros(len(times), bool)
+    begins, people = map(np.array, zip(*givers, strict=True))
+    newest = np.searchsorted(begins, times, side="right") - 1
+    return np.asarray(people[np.maximum(newest, 0)])
 
 
 def _states(cuts: Sequence[EpisodeCut], fps: int, session: Session) -> Iterator[State]:

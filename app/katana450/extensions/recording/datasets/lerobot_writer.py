@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from katana450.errors import InputError
 from katana450.extras import library
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import BoolArray, FloatArray
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 """Quantiles by their names."""
@@ -113,6 +113,9 @@ STATS_PATH = "meta/stats.json"
 
 STATE, ACTION = "observation.state", "action"
 DONE, SUCCEEDED = "next.done", "next.success"
+INTERVENTION = "complementary_info.is_intervention"
+"""1 where a person drove the arm, by the name that learners from corrections read; else 0."""
+
 TIMESTAMP, FRAME, EPISODE, INDEX, TASK = (
     "timestamp",
     "frame_index",
@@ -180,7 +183,7 @@ class DatasetShape:
             ACTION: vector,
             **dict.fromkeys(self.videos.values(), pictures),
             **{name: _scalar("bool") for name in (DONE, SUCCEEDED)},
-            TIMESTAMP: _scalar("float32"),
+            **{name: _scalar("float32") for name in (INTERVENTION, TIMESTAMP)},
             **{name: _scalar("int64") for name in (FRAME, EPISODE, INDEX, TASK)},
         }
 
@@ -270,6 +273,7 @@ class LerobotWriter:
         self,
         state: FloatArray,
         action: FloatArray,
+        by_person: BoolArray,
         task: str,
         success: bool | None,
         videos: Mapping[str, Any],
@@ -280,6 +284,7 @@ class LerobotWriter:
         Args:
             state: (N, n) state of each frame [rad or m].
             action: (N, n) action of each frame [rad or m].
+            by_person: (N,) whether a person drove the arm in each frame.
             task: its task.
             success: whether the task was done; None if that is not known.
             videos: further columns of its row, which tell where its pictures are.
@@ -304,6 +309,7 @@ class LerobotWriter:
         columns: dict[str, npt.NDArray[Any]] = {
             STATE: state.astype(np.float32),
             ACTION: action.astype(np.float32),
+            INTERVENTION: by_person.astype(np.float32),
             DONE: last,
             SUCCEEDED: last & (success is True),
             TIMESTAMP: (np.arange(count) / self._shape.fps).astype(np.float32),

@@ -20,6 +20,7 @@ import numpy as np
 
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
+from katana450.arm.runtime.tick import Submission
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.atomic import bytes_of
 from katana450.errors import InputError
@@ -90,6 +91,22 @@ class TickReader:
             checkpoint: CheckpointMessage = json_form(message.data, CheckpointMessage)
             state: State = self._codec.decoded(State, checkpoint.state)
             return state
+
+
+def given_commands(
+    file: RecordingFile, end: float = math.inf
+) -> Iterator[tuple[float, Submission]]:
+    """Yield the commands up to ``end`` [s] with the times at which the arm took them.
+
+    Raises InputError.
+    """
+    reader = TickReader()
+    for message in file.messages(PLANS, SOLIDS, COMMANDS, end=end):
+        if message.topic != COMMANDS:
+            reader.add_shared(message)
+        elif not isinstance(tick := reader.tick(message), TickMessage):
+            for submission in tick.submissions:
+                yield tick.t, submission
 
 
 def content_of(message: Message, kind: type[T]) -> T:
