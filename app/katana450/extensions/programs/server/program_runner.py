@@ -371,9 +371,9 @@ class ProgramRunner(Runner):
 
     def _rewind(self, participant: Participant) -> int:
         """Restore the state in which the owner took over, and hold the arm there."""
+        self._owner.check_may_steer(participant.person)
         if self._taken_over is None or self.running:
             raise LeaseError("Nobody has taken over from this program.")
-        self._owner.check_may_steer(participant.person)
         self.hub.move(participant, cmd.RestoreState(self._taken_over))
         return self.hub.move(participant, cmd.Hold())
 
