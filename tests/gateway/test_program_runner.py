@@ -13,7 +13,7 @@ import pytest
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import CommandChannel, Grounds, Role
 from katana450.arm.control.session.session import Session
-from katana450.errors import LeaseError
+from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from katana450.extensions.programs.server.program_runner import ProgramRunner
@@ -184,21 +184,23 @@ def test_owner_takes_over_by_moving_the_arm(table: Staged, move: cmd.Command) ->
     holds, session = table.arm.holds, table.arm.session
     for actor, command in (
         (other.actor, move),
-        # Neither a lost key nor the gripper takes over, and no program of the API.
+        # No end of a gesture takes over, nor the gripper, nor a program of the API.
         (began, cmd.Jog(np.zeros(5))),
+        (began, cmd.EndDrag()),
         (began, cmd.Gripper(0.3)),
         (replace(began, channel=CommandChannel.TCP), move),
     ):
         with pytest.raises(LeaseError, match="Wave holds the arm"):
             table.hub.gate.submit(command, actor)
+    with pytest.raises(InputError, match="no axis 9"):
+        table.hub.move(owner, cmd.Joint(9, 0.2))
     with pytest.raises(LeaseError, match="Nobody has taken over"):
         table.programs.steer(owner, ProgramOrder.REWIND)
     table.hub.move(owner, move)
     table.arm.rest = session.begin(session.ready + 0.05, 0.0, 0.0)
-    # The gesture continues, and the arm is not braked.
     table.hub.gate.submit(move, replace(began, seen=table.hub.gate.revocations))
     table.wait(0.1, owner)
-    assert (table.status, table.arm.holds) == ("stopped", holds)
+    assert (table.status, table.arm.holds) == ("stopped", holds + 1)
     assert table.hub.lease.holder == owner.person
     assert table.bar(owner)["why"].startswith("You took over at step 1 of 2. Continue resumes")
     assert table.programs.orders(owner) == ("continue", "rewind")
@@ -208,15 +210,13 @@ def test_owner_takes_over_by_moving_the_arm(table: Staged, move: cmd.Command) ->
     restored = table.arm.commands[-1]
     assert isinstance(restored, cmd.RestoreState)
     np.testing.assert_array_equal(restored.state.setpoint, session.ready)
-    assert table.arm.holds == holds + 1
+    assert table.arm.holds == holds + 2
 
 
 def test_handle_is_grabbed_before_its_first_command_takes_over(table: Staged) -> None:
     owner = table.join(PAGES[0])
     table.run(owner)
     gesture = table.hub.at_scene(owner.person.key, table.hub.gate.revocations)
-    with pytest.raises(LeaseError, match="Wave holds the arm"):
-        table.hub.gate.claim(gesture)
     claimed = table.hub.gate.claim(gesture, of_arm=True)
     assert table.status == "running"
     table.hub.gate.submit(cmd.Joint(1, 0.2), claimed)

@@ -21,9 +21,7 @@ def commands_of(stage: Stage, rng: np.random.Generator, q: np.ndarray) -> list[c
         rates = rng.uniform(-1.0, 1.0, 5) * (0.2, 0.2, 0.2, 0.5, 0.5)
         return [cmd.Jog(rates)] * TICKS_AFTER
     if kind == 1:
-        chain = stage.plan_context.arm.chain
-        goal = rng.uniform(chain.lower[1], chain.upper[1])
-        return [cmd.Joint(2, goal)]
+        return [cmd.Joint(2, rng.uniform(-2.0, 0.1))]
     T = forward(stage.plan_context.arm.chain_to("tcp"), q)
     ends = T[:3, 3] + rng.uniform(-0.1, 0.1, 3)
     return [
@@ -45,11 +43,15 @@ def test_motion_keeps_its_limits_when_a_person_takes_over(stage: Stage) -> None:
     for _ in range(TAKEOVERS):
         moment = moments[rng.integers(len(moments))]
         state = states[moment]
+        # The gate holds the arm first; both may be in one tick.
         gesture = commands_of(stage, rng, state.setpoint)
+        ticks: list[list[cmd.Command]] = [[command] for command in gesture]
+        ticks[0:0] = [[cmd.Hold()]] * int(rng.integers(2))
+        ticks[0].insert(0, cmd.Hold())
         # With the ticks before, so that a step at the first of the person would be seen.
         after = states[moment - 3 : moment + 1]
         for number in range(TICKS_AFTER):
-            commands = gesture[number : number + 1]
+            commands = ticks[number] if number < len(ticks) else []
             state = stage.session.step(state, commands, state.t + TICK)
             state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
             after.append(state)

@@ -107,7 +107,6 @@ def test_frames_tell_whether_a_person_drove(tmp_path: Path) -> None:
         people = driven_by_person(recording, np.array(times))
     assert people[0] == 0.0
     changes = np.flatnonzero(np.diff(people.astype(int)))
-    # At the first command of the person, not later than three ticks after the middle.
     assert len(changes) == 1
     assert ticks // 2 - 1 <= changes[0] < ticks // 2 + 3
 

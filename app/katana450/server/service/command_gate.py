@@ -154,7 +154,7 @@ class CommandGate:
         if actor.channel is CommandChannel.SERVER and not command.traits.protective:
             raise LeaseError("The server itself may not move the arm.")
         if _moves_by_hand(command, actor):
-            self._take_over(actor)
+            self._take_over(command, actor)
         return self._granted(actor, pacing=all(part.traits.pacing for part in command.parts))
 
     def claim(self, actor: Actor, *, of_arm: bool = False) -> Actor:
@@ -429,16 +429,20 @@ class CommandGate:
         self.revocations += 1
         self._jogged = -cmd.JOG_TIME
 
-    def _take_over(self, actor: Actor) -> None:
+    def _take_over(self, command: cmd.Command, actor: Actor) -> None:
         """Give ``actor`` the lease of the program that it owns, which ends at its next step.
 
-        The arm is not held: the command to come continues its motion. No gesture becomes void,
-        because nobody else could drive meanwhile.
+        No gesture becomes void, because nobody else could drive meanwhile. Raises InputError if the
+        arm cannot accept ``command``; the program continues then.
         """
         before, program = self.lease, self.program
         if program is None or program != (before.holder, actor.key):
             return
         self.check_current(actor)
+        arm = self.present()
+        arm.session.check(command)
+        # The path of the program is left in any case, also where its state forbids the command.
+        arm.deliver(cmd.Hold(), replace(actor, grounds=Grounds.PROGRAM_OWNER))
         self.lease = before.hand_over(program.person, actor.person, self._clock())
         self.recorder.lease("taken over", before, self.lease, actor)
 
@@ -460,11 +464,11 @@ class CommandGate:
 def _moves_by_hand(command: cmd.Command, actor: Actor) -> bool:
     """Return whether ``actor`` moves the arm by ``command`` as a person with a handle or key does.
 
-    The end of a jog moves nothing, and a page sends it whenever it loses a key.
+    The end of a jog, which a page sends whenever it loses a key, and that of a drag move nothing.
     """
     if actor.channel not in (CommandChannel.PAGE, CommandChannel.SCENE):
         return False
-    if isinstance(command, cmd.Jog) and not command.rates.any():
+    if isinstance(command, cmd.EndDrag) or (isinstance(command, cmd.Jog) and not command.sample):
         return False
     return any(part.traits.goal for part in command.parts)
 
