@@ -56,5 +56,4 @@ def test_motion_keeps_its_limits_when_a_person_takes_over(stage: Stage) -> None:
             state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
             after.append(state)
         assert stage.loads(after).max() <= 1.0 + 1e-6
-        chain = stage.plan_context.arm.chain
-        assert all(chain.within_limits(state.setpoint) for state in after)
+        assert all(stage.plan_context.arm.chain.within_limits(state.setpoint) for state in after)
