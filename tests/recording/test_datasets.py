@@ -105,9 +105,8 @@ def test_frames_tell_whether_a_person_drove(tmp_path: Path) -> None:
         writer.close()
     with RecordingFile.open(path) as recording:
         people = driven_by_person(recording, np.array(times))
-    assert people[0] == 0.0
     changes = np.flatnonzero(np.diff(people.astype(int)))
-    assert len(changes) == 1
+    assert (bool(people[0]), len(changes)) == (False, 1)
     assert ticks // 2 - 1 <= changes[0] < ticks // 2 + 3
 
 

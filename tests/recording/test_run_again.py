@@ -136,6 +136,7 @@ def test_pause_or_stop_in_the_middle_is_left_out(tmp_path: Path, disturbance: st
     assert run.t[-1] < 2.5 * part.duration
 
 
+@pytest.mark.long
 def test_grasp_and_carried_object_are_repeated(tmp_path: Path) -> None:
     steps = "  - grasp: cup\n  - line: {by: {z: 60}}\n  - nudge: {axis: 1, by: 10}\n"
     states, script = list[State](), program(f"frame: base\nsteps:\n{steps}")
