@@ -21,7 +21,7 @@ import { PARAMETER } from "./viser/names.js";
 const NOTE_EVERY = 100; // ms, minimum between two notes that this page is used
 const DRAW_EVERY = 200; // ms between two looks at the age of the picture
 const SIGN_IN = 4401; // close code: the page has to sign in again
-const REPEATED = ["heartbeat", "jog", "servo", "query", "list_people"]; // requests that are sent without a press
+const REPEATED = ["heartbeat", "jog", "servo", "query"]; // requests that are sent without a press
 
 if (document.documentElement.lang !== "en") import("./language/translator.js");
 const worker = new Worker("static/link.js");
@@ -142,7 +142,6 @@ function lose() {
 /** @param {Page.Answer} answer */
 function take(answer) {
   if (answer.is === "stopped") stopPress.answered();
-  else if (answer.is === "people") parts.people?.heard(answer);
   else if (answer.is === "status") store.take(answer);
   else if ([More, parts.welcome, parts.teach, parts.timeline].some((part) => part?.hear(answer))) return;
   else if (answer.is === "refused" && answer.id !== QUIETLY) {
@@ -177,9 +176,7 @@ async function enter() {
   const answer = await fetch("enter", { method: "POST", body: JSON.stringify({ token }) });
   stopPress.port = answer.headers.get("X-Stop-Port") ?? stopPress.port;
   gate.hidden = answer.ok;
-  // 403: an admin has disconnected this person, whose STOP still works.
-  gate.classList.toggle("out", answer.status === 403);
-  if (answer.status === 403 || (token && !answer.ok)) element("gate-why", HTMLElement).textContent = await answer.text();
+  if (token && !answer.ok) element("gate-why", HTMLElement).textContent = await answer.text();
   return answer.ok;
 }
 

@@ -92,7 +92,6 @@ export class Bar {
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : status.own_program ? "Your program drives" : `${holder} drives`);
     // Programs are included.
     const connected = participants > 1 ? `, ${participants} connected` : "";
-    hide("people-help", status.role !== "admin");
     text("name", request || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
     lease.classList.toggle("asked", requests.length > 0);
     const key = JSON.stringify([mine, holder, status.own_program, status.asked, requests, status.others]);

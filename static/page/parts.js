@@ -18,8 +18,6 @@ export class Parts {
   teach = null;
   /** @type {import("../timeline/timeline.js").Timeline | null} */
   timeline = null;
-  /** @type {import("../people/people.js").People | null} */
-  people = null;
   /** @type {import("../instruments/panel.js").Panel | null} */
   panel = null;
   /** @type {import("../welcome/welcome.js").Welcome | null} */
@@ -43,10 +41,6 @@ export class Parts {
       this.showTimeline(true, !this.timeline?.open);
     });
     const help = element("help", HTMLDialogElement);
-    onClick("people-button", () => {
-      help.close();
-      this.#showPeople();
-    });
     onClick("welcome-button", () => {
       help.close();
       this.#showWelcome();
@@ -110,13 +104,6 @@ export class Parts {
   async replay(file) {
     await this.showTimeline(true, true);
     this.timeline?.replay(file);
-  }
-
-  // Who is connected, for admins.
-  async #showPeople() {
-    const { People } = await import("../people/people.js");
-    this.people ??= new People(this.#page.say);
-    this.people.show();
   }
 
   // The first steps: at each visit until they are dismissed, and from the help.

@@ -17,7 +17,7 @@ const NEAR = 0.15; // s, within which a mark is at a moment
 // Nodes of the present that are hidden while the past is shown, beside the links that move.
 const PRESENT = /^\/(ghost|cup|basin|water|velocity|(target|handles|objects|path|branch)\/[^/]+)$/;
 // Requests that do not concern what is seen.
-const QUIET = /^(stop|rename|ask|withdraw|decline|give|acquire|take|release_lease|query|heartbeat|list_people|kick|breakpoints|speed)$/;
+const QUIET = /^(stop|rename|ask|withdraw|decline|give|acquire|take|release_lease|query|heartbeat|breakpoints|speed)$/;
 /** @type {Record<string, number>} */
 const ARROWS = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 };
 

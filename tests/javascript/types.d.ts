@@ -2,12 +2,12 @@
 declare namespace Api {
   interface Acquire { do: "acquire"; id?: number | string | null; revocations?: number | null; made?: number | null; }
   type Act = Acquire | Ask | Attach | Branch | Breakpoints | ChooseRobot | ClearStop | Decline | EndDrag | Fill | Get |
-    Give | GoToZero | Gripper | Heartbeat | Hello | Hold | Home | Jog | Joint | Joints | Kick | ListPeople | Load |
-    Nudge | OperateArm | Orient | Pause | Place | Pose | Position | Preview | Program | Query | Redo | ReleaseLease |
-    Remove | Rename | Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn |
-    TurnElbow | Undo | Watch | Withdraw;
-  type Answer = Arm | Branches | Done | Echo | Loop | Mesh | Objects | People | ProgramPlan | Refused | Scene | State |
-    Values | Welcome | World;
+    Give | GoToZero | Gripper | Heartbeat | Hello | Hold | Home | Jog | Joint | Joints | Load | Nudge | OperateArm |
+    Orient | Pause | Place | Pose | Position | Preview | Program | Query | Redo | ReleaseLease | Remove | Rename |
+    Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn | TurnElbow | Undo | Watch
+    | Withdraw;
+  type Answer = Arm | Branches | Done | Echo | Loop | Mesh | Objects | ProgramPlan | Refused | Scene | State | Values |
+    Welcome | World;
   interface Arm { is: "arm"; id?: number | string | null; name: string; joints: string[]; lower: number[];
     upper: number[]; speed: number[]; acceleration: number[]; jerk: number[]; ready: number[];
     tools: Record<string, number[][]>; default_tool: string | null; gripper: [number, number, number] | null;
@@ -30,8 +30,6 @@ declare namespace Api {
     id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface ClearStop { do: "clear_stop"; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
-  interface ConnectedPerson { person: number; name: string; role: string; link: string | null; you: boolean;
-    drives: boolean; kept_out: number | null; addresses: string[]; }
   interface Decline { do: "decline"; id?: number | string | null; revocations?: number | null; made?: number | null;
     to: number; }
   interface Done { is: "done"; id?: number | string | null; ticket?: number | null; outcome?: string | null;
@@ -73,10 +71,6 @@ declare namespace Api {
   interface JointLink { label: string; path: string[]; axis: number[]; }
   interface Joints { do: "joints"; q: number[]; id?: number | string | null; revocations?: number | null;
     made?: number | null; wait?: number | null; }
-  interface Kick { do: "kick"; id?: number | string | null; revocations?: number | null; made?: number | null;
-    person: number; seconds?: number; revoke?: boolean; }
-  interface ListPeople { do: "list_people"; id?: number | string | null; revocations?: number | null;
-    made?: number | null; }
   interface Load { do: "load"; id?: number | string | null; revocations?: number | null; made?: number | null;
     scene: string; }
   interface Loop { is: "loop"; id?: number | string | null; period: number; ticks: number; late_p50: number;
@@ -99,7 +93,6 @@ declare namespace Api {
     revocations?: number | null; made?: number | null; wait?: number | null; }
   interface PartRefusal { part: number; command: string; why: string; }
   interface Pause { do: "pause"; id?: number | string | null; revocations?: number | null; made?: number | null; }
-  interface People { is: "people"; id?: number | string | null; people: ConnectedPerson[]; }
   interface Place { do: "place"; id?: number | string | null; revocations?: number | null; made?: number | null;
     name: string; T?: number[][] | null; near?: [number, number] | null; frame?: Frame; shape?: Shape | null;
     size?: number[] | null; mesh?: string | null; can_be_held?: boolean | null; zone?: Zone | null;
