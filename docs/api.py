@@ -117,9 +117,6 @@ raises `RefusedError`, whose text has the reason and what to do. `arm.stop()` se
 once and returns `confirmed` or `requested`. `arm.clear_stop()` waits until the stop can be cleared. If the
 server does not answer, a call raises `LostError`.
 
-With the token of an admin, `arm.list_people()` lists everybody who is connected, and `arm.kick(person)`
-disconnects one of them ([access](access.md#admins)).
-
 Questions cost processor time, of which each person has a [budget](access.md#limits). A question beyond
 the budget is refused with `retry`, the seconds until there is time again. Over HTTP the status is 429,
 with `Retry-After`.

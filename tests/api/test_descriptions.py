@@ -124,7 +124,6 @@ def test_messages_of_a_server_fit_the_schemas(local: VirtualServer) -> None:
             *({"do": "query", "at": topic} for topic in ("branches", "program_plan")),
             {"do": "get", "node": "tcp", "field": "translation"},
             {"do": "heartbeat"},
-            {"do": "list_people"},
             {"do": "nudge", "axis": 5, "by": 0.1, "wait": 20},
             {"do": "joint", "axis": 5, "value": 40},
             {"do": "joint", "axis": 9, "value": 0},

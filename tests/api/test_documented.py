@@ -58,11 +58,6 @@ def test_lease_requests_and_heartbeats_cost_no_budget() -> None:
     assert not any(kind.traits.question for kind in kinds)
 
 
-def test_requests_for_admins_alone() -> None:
-    kinds = [kind for kind in EVERY_REQUEST if kind.traits.admin]
-    assert {kind.__name__ for kind in kinds} == {"ListPeople", "Kick"}
-
-
 @pytest.mark.parametrize(
     "text",
     [

@@ -34,7 +34,6 @@ def test_each_act_has_a_method_that_hides_none_of_the_clients() -> None:
 
 def test_signature_and_documentation_are_those_of_the_class() -> None:
     assert str(inspect.signature(Client.nudge)) == "(self, axis, by)"
-    assert str(inspect.signature(Client.kick)) == "(self, person, seconds=60.0, revoke=False)"
     assert str(inspect.signature(EpisodeClient.judge)) == "(self, outcome, number=None)"
     text = inspect.getdoc(Client.joint) or ""
     assert text.startswith("Move one joint to a value.")

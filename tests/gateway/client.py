@@ -20,8 +20,6 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from katana450.arm.control.lease import HEARTBEAT_INTERVAL
-from katana450.client.client import Client
-from katana450.server.api import answers
 from tests.browser.server import AppServer
 
 SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
@@ -42,13 +40,6 @@ HOUR = 3600.0
 """One hour [s]."""
 
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
-
-
-def people_of(program: Client) -> tuple[answers.ConnectedPerson, ...]:
-    """Return everybody who is connected, as an admin sees them."""
-    answer = program.list_people()
-    assert isinstance(answer, answers.People)
-    return answer.people
 
 
 def healthy(server: AppServer) -> bool:

@@ -17,16 +17,13 @@ from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from katana450.extensions.programs.server.program_runner import ProgramRunner
-from katana450.extensions.server_commands.people_requests import PeopleRequests
-from katana450.server.api import answers, requests
+from katana450.server.api import answers
 from katana450.server.api.program_requests import ProgramOrder, Steer
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
-from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant
-from katana450.server.service.people import Connection
 from tests.gateway.test_hub import PAGES, Table
 from tests.waiting import until
 
@@ -279,21 +276,3 @@ def test_owner_must_be_there_when_a_planned_program_begins(table: Staged, sessio
     table.wait(1.0)
     assert table.status == "ready"
     assert not table.programs.running
-
-
-@pytest.mark.parametrize("revoke", [False, True])
-async def test_program_of_a_disconnected_person_ends(table: Staged, revoke: bool) -> None:
-    people = table.hub.people
-    people.links = Mock()
-    oda = Identity("oda", "Oda", Role.OPERATOR, "oda", "Oda")
-    connection = Connection(oda, "127.0.0.1")
-    people.add(connection)
-    owner = table.hub.join(oda, "page", lambda _: None)
-    admin = table.hub.join(Identity("ada", "Ada", Role.ADMIN), "page", lambda _: None)
-    table.run(owner)
-    (number,) = people.shown
-    kick = requests.Kick(person=number, seconds=60.0, revoke=revoke)
-    table.hub.add_handler(PeopleRequests(table.hub, Namespace()))
-    Dispatcher(table.hub).handle(admin, kick, Budgets(table.hub.clock).of("ada"))
-    assert table.status == "stopped"
-    assert table.hub.lease.holder is None

@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from katana450.arm.control.lease import Role
 from katana450.client import Client, RefusedError
 from katana450.maths.geometry import se3
 from katana450.server.api import answers, requests
-from tests.gateway.client import people_of
+from katana450.server.web.access_links import AccessFile
+from katana450.server.web.authenticator import EXPIRED
+from tests.gateway.client import HOUR
 from tests.gateway.postures import READY, THERE
 from tests.gateway.virtual import VirtualServer
 from tests.waiting import state_when
@@ -199,17 +202,23 @@ def test_admin_who_takes_the_lease_ends_the_wait(local: VirtualServer, watcher: 
     check_nothing_moves_later(watcher)
 
 
-def test_disconnected_program_is_stopped(local: VirtualServer, watcher: Client) -> None:
-    with moving(local, watcher) as answer:
-        (person,) = (entry.person for entry in people_of(watcher) if entry.drives)
-        watcher.kick(person, 60.0)
-    watcher.kick(person, 0.0)
-    status, refused = answer()
-    assert (status, refused["is"]) == (409, "refused")
-    assert refused["why"] == "An admin has disconnected you."
-    assert watcher.query(answers.State).stopped == "Program left while the arm moved."
-    check_nothing_moves_later(watcher)
-    watcher.clear_stop()
+def test_program_whose_link_ends_is_stopped(guarded: VirtualServer, file: AccessFile) -> None:
+    token, other = (file.give(name, Role.OPERATOR, time.time() + HOUR) for name in ("Oda", "Vera"))
+    (number,) = (number for number, grant in file.grants.items() if grant.name == "Oda")
+    body = json.dumps({"do": "joints", "q": THERE.tolist(), "wait": 30}).encode()
+    names: dict[str, Any] = {
+        "Authorization": f"Bearer {token}",
+        "X_Program": "a-program-of-this-test",
+    }
+    with guarded.connect("Watcher", other) as watcher:
+        slow(watcher)
+        sent = guarded.loop.create_task(guarded.request("/api/v1/do", body, **names))
+        state_when(watcher, under_way)
+        file.revoke(number)
+        status, _, refused = guarded.run(wait_of(sent))
+        assert (status, json.loads(refused)["why"]) == (409, EXPIRED)
+        assert watcher.query(answers.State).stopped == "Oda, Program left while the arm moved."
+        check_nothing_moves_later(watcher)
 
 
 def test_time_that_is_up_brings_the_arm_to_rest(local: VirtualServer, watcher: Client) -> None:

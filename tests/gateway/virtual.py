@@ -48,7 +48,6 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.command_gate import guarded
 from katana450.server.service.heartbeats import ARRIVAL, LastHeartbeat
 from katana450.server.service.hub import TICK, Hub
-from katana450.server.service.people import People
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.admission import Admission
@@ -297,10 +296,9 @@ class VirtualServer:
         options, settings, now = _options(words), Settings(), self.clock.now
         robot, session, _ = described
         self.hub = hub = Hub(now, settings.silence)
-        hub.people = People(now)
-        hub.people.links = access
+        hub.requires_link = access is not None
         address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
-        self.authenticator = Authenticator(access, 9, address, hub.people)
+        self.authenticator = Authenticator(access, 9, address)
         budgets = Budgets(now)
         hub.use_runner(load(RUNNER)(hub, options))
         for handler in provided("handler"):

@@ -83,7 +83,8 @@ class Gateway:
         self.viser: viser.ViserServer = open_server(key)
         self.hub = Hub(time.monotonic, settings.silence, meshes)
         self.hub.gate.sample_delay = settings.sample_delay
-        self.hub.people, self.hub.stop_path = web.people, web.stop_path
+        self.hub.stop_path = web.stop_path
+        self.hub.requires_link = web.authenticator.requires_link
         self.hub.gate.recorder = web.recorder
         guard = Guard(self.viser)
         self.gestures = Gestures(self.viser, guard, self.hub)
@@ -191,7 +192,7 @@ def control_routes(hub: Hub, budgets: Budgets, web: WebServer, proxy: Proxy) -> 
 
     async def stop(request: Request) -> Response:
         """Stop the arm, like the button, for a page whose socket is closed."""
-        identity = signed_in(authenticator, request, stopping=True)
+        identity = signed_in(authenticator, request)
         press = request.query_params.get("press", "")[:MAX_PRESS_LENGTH]
         actor = actor_of(identity, CommandChannel.PAGE)
         if PAGE.fullmatch(name := request.query_params.get("page", "")):

@@ -173,11 +173,6 @@ def page_routes(
             response.headers[STOP_PORT] = str(stop_path.port)
         if not entry.token and authenticator.identity(request.cookies) is not None:
             return response
-        bearer = f"Bearer {entry.token}" if entry.token else ""
-        # An admin may keep out the bearer of the token or of the cookie.
-        why = authenticator.refusal(request.cookies, bearer)
-        if why is not None:
-            raise HTTPException(403, why)
         visitor, peer = authenticator.sign_in(entry.token, response), address_of(request)
         if visitor is not None:
             actor = actor_of(replace(visitor, address=peer), CommandChannel.PAGE)
@@ -220,11 +215,9 @@ def _viser_routes(authenticator: Authenticator) -> list[Route]:
     return [Route("/viser/", page), Route("/viser/{name}", file)]
 
 
-def signed_in(
-    authenticator: Authenticator, request: Request, *, stopping: bool = False
-) -> Identity:
+def signed_in(authenticator: Authenticator, request: Request) -> Identity:
     """Return the identity of the sender of ``request``. Raises HTTPException without one."""
-    identity = authenticator.identity(request.cookies, stopping=stopping)
+    identity = authenticator.identity(request.cookies)
     if identity is None:
         raise HTTPException(401, "Sign in at the start page first.")
     return replace(identity, address=address_of(request))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import socket
 import threading
-import time
 from asyncio import BaseTransport, Transport
 from collections.abc import Coroutine
 from http import HTTPStatus
@@ -27,7 +26,6 @@ from katana450.assembly.authentication import access_file, address_of, tls_conte
 from katana450.assembly.page_routes import page_routes
 from katana450.errors import ConfigurationError
 from katana450.server.service.heartbeats import ARRIVAL, PING, LastHeartbeat, keep_alive
-from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_path import StopPath
 from katana450.server.web.acceptor import Acceptor
@@ -62,7 +60,6 @@ class WebServer:
 
     Attributes:
         address: Names and addresses of the server.
-        people: Everybody who is connected or kept out.
         recorder: Notes events.
         authenticator: Identifies clients.
         stop_path: Second path of STOP.
@@ -90,12 +87,11 @@ class WebServer:
         self.host: str = listening.getsockname()[0]
         self.acceptor = Acceptor(listening)
         keep_alive(listening)
-        self.people, self.recorder = People(time.monotonic), Recorder()
+        self.recorder = Recorder()
         # Until the event log takes its notes, they wait.
         self.recorder.enabled = True
-        self.people.links = access
         port = self.stop_path.main_port
-        self.authenticator = Authenticator(access, port, self.address, self.people)
+        self.authenticator = Authenticator(access, port, self.address)
         self.routes = page_routes(self.authenticator, self.stop_path, self.recorder)
         self._app: ASGIApp = Starlette(routes=self.routes)
         self._beside: list[asyncio.Task[None]] = []

@@ -286,21 +286,6 @@ class Acts(Generic[AtRest, Answered, Sent]):
             name: Name, of at most 24 characters. That of an access link cannot be changed.
         """
 
-    def list_people(self) -> Answered:
-        """List everybody who is connected or kept out. For admins only."""
-
-    def kick(self, person: int, seconds: float = ..., revoke: bool = ...) -> Answered:
-        """Close all connections of a person, and keep the person out for a while. For admins only.
-
-        The person can still stop the arm over HTTP. A running program of the person ends.
-
-        Args:
-            person: Number of the person in ``people``.
-            seconds: Time [s] after which the person may come back; 0 lets the person in at once.
-            revoke: Whether to revoke the access link for good. An admin's link is revoked by
-                ``katana450 access revoke`` alone.
-        """
-
     def place(
         self,
         name: str,

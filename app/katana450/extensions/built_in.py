@@ -17,7 +17,6 @@ EXTENSIONS = (
                 f"{HERE}.server_commands.access_command:access",
             ),
         ),
-        handler=f"{HERE}.server_commands.people_requests:PeopleRequests",
     ),
     Extension("api_description", routes=f"{HERE}.api_description:description_routes"),
     Extension(

@@ -1,1 +1,1 @@
-"""Commands about a running server: who may use it, who is connected, and one motion."""
+"""The command that says who may use a server."""

@@ -446,36 +446,6 @@ class Loop(Answer, frozen=True, kw_only=True):
     lost: int
 
 
-class ConnectedPerson(msgspec.Struct, frozen=True, kw_only=True):
-    """A person with all connections: everybody who uses one link; without links, one browser.
-
-    Attributes:
-        person: Number for ``kick``.
-        name: Name of the link or, without links, of the first page or program.
-        role: viewer, operator or admin.
-        link: Number of the access link; null without links.
-        you: Whether this is the person who asks.
-        drives: Whether the person holds the lease, or owns the program that holds it.
-        kept_out: Time [s] for which the person is kept out; null unless kicked.
-        addresses: Address of each open connection, as the server sees it, the oldest first.
-    """
-
-    person: int
-    name: str
-    role: str
-    link: str | None
-    you: bool
-    drives: bool
-    kept_out: float | None
-    addresses: tuple[str, ...]
-
-
-class People(Answer, frozen=True, kw_only=True):
-    """Everybody who is connected or kept out."""
-
-    people: tuple[ConnectedPerson, ...]
-
-
 EVERY: tuple[type[Answer], ...] = tuple(
     kind
     for kind in globals().values()

@@ -37,9 +37,6 @@ NodeName = Annotated[str, Meta(min_length=1, max_length=100)]
 Key = Annotated[str, Meta(pattern="^[0-9a-f]{1,64}$")]
 
 
-ADMIN = Traits(admin=True, extension=True)
-"""Traits of a request for admins, which works whatever others ask for."""
-
 LEASE = Traits(free=True)
 """Traits of a request about the lease."""
 

@@ -27,7 +27,6 @@ from katana450.arm.control.state.scene_objects import Zone as Zone
 from katana450.errors import InputError
 from katana450.server.api.fields import *
 from katana450.server.api.fields import (
-    ADMIN,
     LEASE,
     MAX_REQUEST_BYTES,
     MAX_STATES_PER_SECOND,
@@ -37,9 +36,6 @@ from katana450.server.api.fields import (
     NodeName,
     Press,
 )
-
-MAX_TIME_OUT = 86_400.0
-"""Maximum time [s] for which an admin keeps somebody out without revoking the link."""
 
 
 class Hello(Request, frozen=True, kw_only=True):
@@ -177,31 +173,6 @@ class Rename(Request, frozen=True, kw_only=True):
     traits: ClassVar[Traits] = Traits()
 
     name: Annotated[str, Meta(max_length=200)]
-
-
-class ListPeople(Request, frozen=True):
-    """List everybody who is connected or kept out. For admins only."""
-
-    traits: ClassVar[Traits] = Traits(admin=True, answered=True, extension=True)
-
-
-class Kick(Request, frozen=True, kw_only=True):
-    """Close all connections of a person, and keep the person out for a while. For admins only.
-
-    The person can still stop the arm over HTTP. A running program of the person ends.
-
-    Attributes:
-        person: Number of the person in ``people``.
-        seconds: Time [s] after which the person may come back; 0 lets the person in at once.
-        revoke: Whether to revoke the access link for good. An admin's link is revoked by
-            ``katana450 access revoke`` alone.
-    """
-
-    traits: ClassVar[Traits] = ADMIN
-
-    person: int
-    seconds: Annotated[float, Meta(ge=0.0, le=MAX_TIME_OUT)] = 60.0
-    revoke: bool = False
 
 
 class Place(Request, frozen=True, kw_only=True, eq=False):

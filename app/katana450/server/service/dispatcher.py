@@ -11,9 +11,8 @@ import numpy as np
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Request
-from katana450.arm.control.lease import Role
 from katana450.arm.control.state.state import Verdict
-from katana450.errors import InputError, KatanaError, LeaseError
+from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import so3
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize
@@ -59,8 +58,7 @@ class Dispatcher:
         ``free`` request and a command of the driver cost nothing.
         """
         question, driver = request.traits.question, driver_key(self._hub, participant)
-        admin = request.traits.admin and participant.person.role is Role.ADMIN
-        free = request.traits.free or admin or (driver and not question)
+        free = request.traits.free or (driver and not question)
         wait = request.wait if isinstance(request, requests.MotionRequest) else None
         holds = self._hub.lease.holder == participant.person
         if not (request.traits.free or question):
@@ -88,8 +86,6 @@ class Dispatcher:
         still = request.traits.free or request.traits.question
         limit = math.inf if still else hub.gate.sample_delay
         delay = hub.heartbeat(participant, request.made, limit)
-        if request.traits.admin and participant.person.role is not Role.ADMIN:
-            raise LeaseError("Only an admin may do this.")
         match request:
             case requests.Heartbeat(n=n):
                 return answers.Echo(n=n)

@@ -36,7 +36,6 @@ from katana450.server.service.participants import (
     renamed,
     session_of,
 )
-from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import RequestHandler, Runner
 from katana450.server.service.stop_path import StopPath
@@ -88,7 +87,8 @@ class Hub:
         self.gate.presser_of = self._presser_of
         self.stop_path, self.stop_news = StopPath(), StopNews()
         self._followed: State | None = None
-        self.people = People(clock)
+        self.requires_link = False
+        """Whether the server requires access links."""
         self.handlers: list[RequestHandler] = []
         self.use_runner(Runner())
         self.meshes = Meshes() if meshes is None else meshes
@@ -400,4 +400,4 @@ class Hub:
 
     def _presser_of(self, cause: StopCause) -> Actor | None:
         """Return the participant that pressed STOP on the port of STOP; None for a watchdog."""
-        return presser_of(cause, self._known.people, links=self.people.links is not None)
+        return presser_of(cause, self._known.people, links=self.requires_link)

@@ -20,7 +20,6 @@ class Identity:
         name: Name of the access link or of a program; None for a browser without a link.
         role: Role of the client.
         link: Number of the access link; empty without one.
-        link_name: Name of the link, also of a program with a name of its own; empty without one.
         address: Network address of the client; empty if it is unknown.
     """
 
@@ -28,7 +27,6 @@ class Identity:
     name: str | None
     role: Role
     link: str = ""
-    link_name: str = ""
     address: str = ""
 
     def person(self, key: str, name: str) -> Person:

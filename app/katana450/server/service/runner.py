@@ -92,9 +92,6 @@ class Runner(RequestHandler):
     def leave(self, participant: Participant) -> None:
         """Note that ``participant`` is closed and will not return."""
 
-    def removed(self, session: str) -> None:
-        """Note that an admin has disconnected the person of ``session``. End what it runs."""
-
     def progress(self) -> answers.Progress | None:
         """Return the progress of the present or last run; the state includes it."""
 

@@ -23,7 +23,6 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.limits import ConnectionLimit
 from katana450.server.service.participants import actor_of, key_of
-from katana450.server.service.people import Connection
 from katana450.server.viser_bridge.frames import FRAME_SLOT_HEADER, FrameSlot, Stamp
 from katana450.server.viser_bridge.guard import FilterResult, Guard, MessageFilter, Ruling
 from katana450.server.viser_bridge.viser_server import KEY_HEADER
@@ -119,7 +118,6 @@ class Proxy:
                 why = await self._authenticator.run_while_authorised(
                     lambda: self._authenticator.identity(browser.cookies),
                     line.run(upstream),
-                    Connection(identity, address_of(browser), key=key),
                 )
                 if why is not None:
                     await browser.close(SIGN_IN_CLOSE_CODE, why)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 import secrets
 import time
 from collections.abc import Callable, Coroutine, Mapping
@@ -16,7 +15,6 @@ from urllib.parse import urlsplit
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
 from katana450.server.service.identity import Identity
-from katana450.server.service.people import Connection, People
 from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile, Grant
 
 if TYPE_CHECKING:
@@ -33,8 +31,7 @@ SIGN_IN_CLOSE_CODE = 4401
 """Close code for a client that must sign in (again) at the start page."""
 
 EXPIRED = "Your link has expired or was revoked."
-KICKED = "An admin has disconnected you."
-"""Reasons for which a connection is closed."""
+"""Reason for which a connection is closed."""
 
 TOKEN_REQUIRED = "A token is required. `katana450 access give` makes one."
 
@@ -118,15 +115,9 @@ def public_origin(url: str) -> str:
 class Authenticator:
     """Identifies clients by their cookies and tokens."""
 
-    def __init__(
-        self, access: AccessFile | None, port: int, address: Address, people: People | None = None
-    ) -> None:
-        """Check clients against ``access``; None makes every client an admin.
-
-        ``people``: everybody who is connected or kept out.
-        """
+    def __init__(self, access: AccessFile | None, port: int, address: Address) -> None:
+        """Check clients against ``access``; None makes every client an admin."""
         self._access = access
-        self._people = People(time.monotonic) if people is None else people
         self.address = address
         """Names and addresses of the server."""
         # Browsers send cookies to all ports of a host.
@@ -137,52 +128,21 @@ class Authenticator:
         """True if the server requires an access link."""
         return self._access is not None
 
-    def identity(self, cookies: Mapping[str, str], *, stopping: bool = False) -> Identity | None:
-        """Return the identity of the sender of ``cookies``; None if it is not authorised.
-
-        ``stopping``: whether the request is a STOP, which an identity may send that is kept out.
-        """
+    def identity(self, cookies: Mapping[str, str]) -> Identity | None:
+        """Return the identity of the sender of ``cookies``; None if it is not authorised."""
         value = cookies.get(self._cookie, "")
-        if self._access is not None:
-            known = self._access.check_session(value, time.time())
-            visitor = None if known is None else identity_of(*known)
-        else:
-            visitor = Identity(value, None, Role.ADMIN) if len(value) == SESSION_SIZE else None
-        return self._admitted(visitor, stopping=stopping)
-
-    def refusal(self, cookies: Mapping[str, str], authorization: str = "") -> str | None:
-        """Return why an admin keeps out the sender of these headers; None if no admin does."""
-        visitor = self.program("", authorization, cookies, stopping=True)
         if self._access is None:
-            visitor = self.identity(cookies, stopping=True)
-        return None if visitor is None else self.kept_out(visitor.session)
-
-    def kept_out(self, session: str) -> str | None:
-        """Return why an admin keeps out the identity of ``session``; None if no admin does."""
-        seconds = self._people.kept_out(session)
-        if not seconds:
-            return None
-        again = f" Come back in {math.ceil(seconds)} s." if seconds < math.inf else ""
-        return f"{KICKED}{again} Your STOP still works."
-
-    def _admitted(self, visitor: Identity | None, *, stopping: bool) -> Identity | None:
-        """Return ``visitor``, or None if it is kept out and not ``stopping`` the arm."""
-        if visitor is None or stopping or not self._people.kept_out(visitor.session):
-            return visitor
-        return None
+            return Identity(value, None, Role.ADMIN) if len(value) == SESSION_SIZE else None
+        known = self._access.check_session(value, time.time())
+        return None if known is None else identity_of(*known)
 
     def program(
-        self,
-        name: str,
-        authorization: str = "",
-        cookies: Mapping[str, str] | None = None,
-        *,
-        stopping: bool = False,
+        self, name: str, authorization: str = "", cookies: Mapping[str, str] | None = None
     ) -> Identity | None:
         """Return the identity of the program that sends this Authorization header or ``cookies``.
 
         ``name``: the program's own name; it follows the name of the link where one is required.
-        ``stopping``: see ``identity``. Return None if the program is not authorised.
+        Return None if the program is not authorised.
         """
         name = name if name.isprintable() and 0 < len(name) <= MAX_NAME_LENGTH else "Program"
         if self._access is None:
@@ -191,40 +151,28 @@ class Authenticator:
         if scheme.lower() == "bearer":
             known = self._access.check(token.strip(), time.time())
             visitor = None if known is None else identity_of(*known)
-            visitor = self._admitted(visitor, stopping=stopping)
         else:
-            visitor = self.identity(cookies or {}, stopping=stopping)
+            visitor = self.identity(cookies or {})
         return None if visitor is None else replace(visitor, name=f"{visitor.name}, {name}")
 
     async def run_while_authorised(
-        self,
-        identity: Callable[[], Identity | None],
-        work: Coroutine[Any, Any, None],
-        connection: Connection,
+        self, identity: Callable[[], Identity | None], work: Coroutine[Any, Any, None]
     ) -> str | None:
-        """Run ``work`` as long as ``identity`` returns one and nobody is kicked.
+        """Run ``work`` as long as ``identity`` returns one.
 
-        ``connection`` is listed meanwhile. Returns the reason for an end from outside; None if
-        ``work`` ended by itself.
+        Returns the reason for an end from outside; None if ``work`` ended by itself.
         """
         task = asyncio.create_task(work)
-        kicked = asyncio.create_task(connection.kicked.wait())
         try:
-            with self._people.connected(connection):
-                while True:
-                    done, _ = await asyncio.wait(
-                        [task, kicked], timeout=CHECK_EVERY, return_when=asyncio.FIRST_COMPLETED
-                    )
-                    if task in done:
-                        await task
-                        return None
-                    if kicked in done:
-                        return KICKED
-                    if identity() is None:
-                        return EXPIRED
+            while True:
+                done, _ = await asyncio.wait([task], timeout=CHECK_EVERY)
+                if done:
+                    await task
+                    return None
+                if identity() is None:
+                    return EXPIRED
         finally:
-            for waiting in (task, kicked):
-                waiting.cancel()
+            task.cancel()
             with suppress(asyncio.CancelledError):
                 await task
 
@@ -254,4 +202,4 @@ class Authenticator:
 
 def identity_of(number: str, grant: Grant) -> Identity:
     """Return the identity of the link of ``number``."""
-    return Identity(number, grant.name, grant.role, number, grant.name)
+    return Identity(number, grant.name, grant.role, number)

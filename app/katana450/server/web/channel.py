@@ -29,7 +29,6 @@ from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.limits import TokenBucket
 from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer
-from katana450.server.service.people import Connection
 from katana450.server.web.admission import LIMIT_CLOSE_CODE, address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 
@@ -144,15 +143,12 @@ class Channel(ABC):
         authenticator: Authenticator,
         identity: Callable[[], Identity | None],
         participant: Participant,
-        sender: Identity,
     ) -> None:
         """Serve ``participant`` until one side closes, or until it is no longer authorised.
 
-        ``identity``: returns its identity, None once that has expired. ``sender``: the identity
-        with the address, for the list of people.
+        ``identity``: returns its identity, None once that has expired.
         """
-        connection = Connection(sender, sender.address, key=participant.person.key)
-        why = await authenticator.run_while_authorised(identity, self.run(participant), connection)
+        why = await authenticator.run_while_authorised(identity, self.run(participant))
         if why is not None:
             self.hub.recorder.note("revocation", participant.actor, always=True, why=why)
             await self._line.close(SIGN_IN_CLOSE_CODE, why)
@@ -330,7 +326,7 @@ async def serve_page(
     control.greet(participant)
     try:
         await control.serve(
-            authenticator, lambda: authenticator.identity(socket.cookies), participant, identity
+            authenticator, lambda: authenticator.identity(socket.cookies), participant
         )
     finally:
         hub.leave(participant)

@@ -26,9 +26,8 @@ from katana450.server.service.budget import HTTP_REQUEST_COST, Budget, Budgets, 
 from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import SHARED_SESSION, Participant, actor_of, session_of
+from katana450.server.service.participants import SHARED_SESSION, Participant, actor_of
 from katana450.server.service.pending_answer import ARRIVED, PendingAnswer
-from katana450.server.service.people import Connection
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, client_of
@@ -89,7 +88,6 @@ class _HttpProgram(NamedTuple):
     """A program that sends requests by POST; ``timer`` lets it leave after its last request."""
 
     participant: Participant
-    connection: Connection
     timer: asyncio.TimerHandle
 
 
@@ -151,7 +149,7 @@ class Api:
         return query
 
     async def _stop(self, request: Request) -> Response:
-        sender = self._identity(request, stopping=True)
+        sender = self._identity(request)
         press = request.query_params.get("press", "")[:MAX_PRESS_LENGTH]
         self._hub.stop(actor_of(sender, CommandChannel.HTTP), press or None)
         return Response(status_code=204)
@@ -165,7 +163,7 @@ class Api:
             )
             return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
         body = await body_of(request, requests.MAX_REQUEST_BYTES)
-        # An admin may have disconnected the sender while the body was received.
+        # The link of the sender may have ended while the body was received.
         identity = self._identity(request)
         try:
             decoded = self._hub.requests.decoded(body)
@@ -178,7 +176,7 @@ class Api:
             answer = self._dispatcher.handle(participant, decoded, self._budget(request))
             if isinstance(answer, PendingAnswer):
                 if answer.waits:
-                    answer = await self._watched(request, identity, participant, answer)
+                    answer = await self._watched(request, participant, answer)
                 else:
                     answer = await answer.answer()
             end = answer.end if isinstance(answer, answers.Done) else None
@@ -198,14 +196,13 @@ class Api:
     async def _watched(
         self,
         request: Request,
-        identity: Identity,
         participant: Participant,
         pending: PendingAnswer,
     ) -> answers.Answer:
         """Return the answer at the end of a motion.
 
-        If the sender closes the connection before it, is disconnected by an admin, or its link
-        ends, its program leaves as if a socket were closed, so a moving arm stops.
+        If the sender closes the connection before it, or its link ends, its program leaves as if
+        a socket were closed, so a moving arm stops.
         """
         results: list[answers.Answer] = []
 
@@ -228,10 +225,7 @@ class Api:
             token = request.headers.get("authorization", "")
             return self._authenticator.program("", token, request.cookies)
 
-        key = participant.person.key
-        identity = replace(identity, session=session_of(key))
-        connection = Connection(identity, address_of(request), key=key)
-        why = await self._authenticator.run_while_authorised(current, work(), connection)
+        why = await self._authenticator.run_while_authorised(current, work())
         return results[0] if results else answers.Refused(why=why or "The connection was closed.")
 
     def _note_flood(self, identity: Identity, error: BusyError) -> None:
@@ -241,28 +235,15 @@ class Api:
         sender = client_of(self._authenticator, request)
         return self._budgets.of(address_of(request) if sender is None else sender.session)
 
-    def _identity(self, request: Request, *, stopping: bool = False) -> Identity:
+    def _identity(self, request: Request) -> Identity:
         headers = request.headers
         sender = self._authenticator.program(
-            headers.get(NAME, ""),
-            headers.get("authorization", ""),
-            request.cookies,
-            stopping=stopping,
+            headers.get(NAME, ""), headers.get("authorization", ""), request.cookies
         )
         if sender is None:
-            why = self._authenticator.refusal(request.cookies, headers.get("authorization", ""))
-            self._hub.recorder.note(
-                "sign-in",
-                stranger(address_of(request)),
-                outcome=REFUSED,
-                why=why or "No valid token.",
-            )
-            raise HTTPException(401, TOKEN_REQUIRED) if why is None else HTTPException(403, why)
-        if not self._authenticator.requires_link and not stopping:
-            # Without links these programs share one session, so that an admin can keep them out.
-            why = self._authenticator.kept_out(SHARED_SESSION)
-            if why is not None and KEY in headers:
-                raise HTTPException(403, why)
+            peer = stranger(address_of(request))
+            self._hub.recorder.note("sign-in", peer, outcome=REFUSED, why="No valid token.")
+            raise HTTPException(401, TOKEN_REQUIRED)
         return replace(sender, address=address_of(request))
 
     def _participant(self, request: Request, identity: Identity) -> Participant:
@@ -279,23 +260,21 @@ class Api:
                 identity, page, lambda _notice: None, channel=CommandChannel.HTTP
             )
             assert participant.person.key == key
-            connection = Connection(identity, address_of(request), key=key)
-            self._hub.people.add(connection)
         else:
-            participant, connection, timer = known
+            participant, timer = known
             timer.cancel()
-        self._remember(key, participant, connection)
+        self._remember(key, participant)
         return participant
 
-    def _remember(self, key: str, participant: Participant, connection: Connection) -> None:
+    def _remember(self, key: str, participant: Participant) -> None:
         timer = asyncio.get_running_loop().call_later(LEASE_TIMEOUT, self._expire, key)
-        self._programs[key] = _HttpProgram(participant, connection, timer)
+        self._programs[key] = _HttpProgram(participant, timer)
 
     def _expire(self, key: str) -> None:
         """Let the program of ``key`` leave, unless it waits for the end of a motion."""
         known = self._programs[key]
         if known.participant.heartbeat.open:
-            self._remember(key, known.participant, known.connection)
+            self._remember(key, known.participant)
         else:
             self._forget(key)
 
@@ -307,9 +286,8 @@ class Api:
     def _forget(self, key: str) -> None:
         if key not in self._programs:
             return
-        participant, connection, timer = self._programs.pop(key)
+        participant, timer = self._programs.pop(key)
         timer.cancel()
-        self._hub.people.remove(connection)
         self._hub.leave(participant, for_good=True)
 
 

@@ -70,12 +70,11 @@ BUDGET_EXHAUSTED = "Your programs together send too many requests. Wait, and sen
 
 
 class ProgramClient(NamedTuple):
-    """The other side of a connection. ``why``: why it is refused unless authorised."""
+    """The other side of a connection."""
 
     identity: Callable[[], Identity | None]
     channel: CommandChannel
     address: str
-    why: str
 
 
 class ProgramChannel(Channel):
@@ -174,8 +173,7 @@ async def serve_socket(
             hub.recorder.refuse("connection", actor, InputError(BUDGET_EXHAUSTED))
         await channel.close(LIMIT_CLOSE_CODE, BUDGET_EXHAUSTED)
         return
-    why = authenticator.refusal(socket.cookies, token) or TOKEN_REQUIRED
-    client = ProgramClient(current_identity, CommandChannel.WEBSOCKET, address_of(socket), why)
+    client = ProgramClient(current_identity, CommandChannel.WEBSOCKET, address_of(socket))
     await _serve(hub, authenticator, budget, channel, client, make)
 
 
@@ -246,8 +244,7 @@ class LineServer:
         exemption = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
         with self._places.taken(session, places) as free, exemption:
             if free:
-                why = self._authenticator.refusal({}, f"Bearer {hello.token}") or TOKEN_REQUIRED
-                program = ProgramClient(current_identity, CommandChannel.TCP, client[0], why)
+                program = ProgramClient(current_identity, CommandChannel.TCP, client[0])
                 await _serve(self._hub, self._authenticator, budget, line, program)
             else:
                 why = f"At most {LINES} programs can connect, and {LINES_EACH} with one link."
@@ -282,8 +279,8 @@ async def _serve(
     sender = client.identity()
     if sender is None:
         refused = replace(stranger(client.address), channel=client.channel)
-        hub.recorder.note("sign-in", refused, outcome=REFUSED, why=client.why)
-        await line.close(SIGN_IN_CLOSE_CODE, client.why)
+        hub.recorder.note("sign-in", refused, outcome=REFUSED, why=TOKEN_REQUIRED)
+        await line.close(SIGN_IN_CLOSE_CODE, TOKEN_REQUIRED)
         return
     program = make(hub, line, budget)
     page = secrets.token_hex(16)
@@ -291,7 +288,7 @@ async def _serve(
     participant = hub.join(sender, page, program.notify, line.arrival, client.channel)
     program.greet(participant)
     try:
-        await program.serve(authenticator, client.identity, participant, sender)
+        await program.serve(authenticator, client.identity, participant)
     finally:
         hub.leave(participant, for_good=True)
 

@@ -178,9 +178,9 @@ class StopServer:
             part.strip().partition("=")[::2] for part in headers.get("cookie", "").split(";")
         )
         if path == STOP_PATHS[0]:
-            return self._authenticator.identity(cookies, stopping=True)
+            return self._authenticator.identity(cookies)
         return self._authenticator.program(
-            headers.get("x-name", ""), headers.get("authorization", ""), cookies, stopping=True
+            headers.get("x-name", ""), headers.get("authorization", ""), cookies
         )
 
     async def _stop(

@@ -59,7 +59,6 @@ class Traits:
         free: costs nothing of the budget, even when that is used up.
         question: changes nothing.
         answered: answered even without an ``id``.
-        admin: for admins only, whom it costs nothing of the budget.
         extension: answered by an extension. A server without it refuses the request.
     """
 
@@ -80,7 +79,6 @@ class Traits:
     free: bool = False
     question: bool = False
     answered: bool = False
-    admin: bool = False
     extension: bool = False
 
     def __post_init__(self) -> None:

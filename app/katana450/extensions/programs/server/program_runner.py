@@ -46,7 +46,7 @@ from katana450.server.api import program_requests as requests
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.dispatcher import ACCEPTED
 from katana450.server.service.hub import Hub
-from katana450.server.service.participants import Participant, session_of
+from katana450.server.service.participants import Participant
 from katana450.server.service.runner import Runner, StatusLine
 
 log = logging.getLogger(__name__)
@@ -211,12 +211,6 @@ class ProgramRunner(Runner):
             self.planner.forget_run(why)
             if self.running:
                 self._end(f"{why}.")
-
-    def removed(self, session: str) -> None:
-        """End the program of the person of ``session``."""
-        owner = self._owner.participant
-        if owner is not None and session_of(owner.person.key) == session:
-            self.leave(owner)
 
     def tick(self) -> None:
         """Advance the running program by one step, or end it if owner, lease or stop demand it."""
