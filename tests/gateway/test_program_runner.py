@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from argparse import Namespace
 from dataclasses import replace
 from typing import Any
@@ -16,6 +17,7 @@ from katana450.arm.control.session.session import Session
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.serve_options import OWNER_SILENCE
+from katana450.extensions.programs.server.program_planner import Planning
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.server.api import answers
 from katana450.server.api.program_requests import ProgramOrder, Steer
@@ -221,8 +223,13 @@ def test_handle_is_grabbed_before_its_first_command_takes_over(table: Staged) ->
     assert (table.status, table.hub.gate.is_current(claimed)) == ("stopped", True)
 
 
-def test_run_from_before_a_stop_is_not_executed_after_it(table: Staged) -> None:
+def test_run_from_before_a_stop_is_not_executed_after_it(
+    table: Staged, monkeypatch: pytest.MonkeyPatch
+) -> None:
     participant = table.join(PAGES[0])
+    cleared = threading.Event()
+    # The stop comes while the script is being planned, however fast that is.
+    monkeypatch.setattr(Planning, "_check", lambda _: cleared.wait(60.0))
     table.programs.script(participant, SCRIPT, more=False, speed=1.0)
     table.programs.steer(participant, ProgramOrder.RUN)
     revocations = table.hub.gate.revocations
@@ -233,6 +240,7 @@ def test_run_from_before_a_stop_is_not_executed_after_it(table: Staged) -> None:
     late = Steer(order=ProgramOrder.RUN, revocations=revocations)
     with pytest.raises(LeaseError, match="Do it again"):
         dispatcher.handle(participant, late, Budgets(table.hub.clock).of("page"))
+    cleared.set()
     until(lambda: table.status != "planning", 60.0)
     table.wait(1.0, participant)
     assert table.status == "ready"
