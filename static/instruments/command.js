@@ -13,6 +13,7 @@ export class Command {
   #open = 0; // number of unanswered requests
   #ticket = 0;
   #until = 0;
+  revocations = 0; // of the state before the turn
 
   // id: id of the requests. request: returns the message for a value, without the id.
   /** @param {string} id @param {(value: number) => Api.Act} request @param {Page.Say} say */
@@ -33,10 +34,10 @@ export class Command {
     this.#timer = null;
     this.#sent = performance.now();
     this.#open += 1;
-    this.#say({ ...this.#request(this.#value), id: this.id });
+    this.#say({ ...this.#request(this.#value), revocations: this.revocations, id: this.id });
   }
 
-  /** @param {Api.Done} answer */
+  /** @param {Pick<Api.Done, "ticket">} answer */
   done({ ticket }) {
     this.#open = Math.max(0, this.#open - 1);
     if (ticket == null) this.#until = performance.now() + HEED;

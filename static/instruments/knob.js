@@ -60,6 +60,8 @@ export class Knob {
   /** Show the goal and the value of the arm in `state`. @param {Api.State} state @param {number} goal @param {number} now */
   take(state, goal, now) {
     this.#now = now;
+    // A turn that began before a stop is void after it.
+    if (this.#held === null) this.#command.revocations = state.revocations;
     if (this.#held === null && this.#command.heededIn(state)) this.#goal = goal;
     this.#draw();
   }
@@ -67,6 +69,13 @@ export class Knob {
   /** @param {Api.Done | Api.Refused} message */
   answered(message) {
     if (message.is !== "refused") return this.#command.done(message);
+    const { retry } = message;
+    // A value that came late is sent again while the hand still holds the knob.
+    if (retry && this.#held) {
+      this.#command.done({});
+      setTimeout(() => this.#held && this.#command.send(this.#goal ?? 0), 1000 * retry);
+      return;
+    }
     this.spring();
     this.element.classList.add("refused");
     setTimeout(() => this.element.classList.remove("refused"), SHAKEN);

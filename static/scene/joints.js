@@ -134,9 +134,11 @@ export class Joints {
     this.drop();
   }
 
-  /** Give up a drag whose command was refused. @param {Api.Refused} answer */
-  refused({ id }) {
-    if (id === ID) this.drop();
+  /** Give up a drag whose command was refused; one that came late is sent again. @param {Api.Refused} answer */
+  refused({ id, retry }) {
+    if (id !== ID) return;
+    if (retry && this.#drag) delete this.#drag.last;
+    else this.drop();
   }
 
   // End the drag, and send nothing.

@@ -59,8 +59,9 @@ def middle(element: Any) -> tuple[float, float, float]:
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["width"] / 2
 
 
-def turn(page: ViserPage, name: str, degrees: float) -> None:
-    """Drag round a knob clockwise, from its top."""
+@contextmanager
+def turned(page: ViserPage, name: str, degrees: float) -> Iterator[None]:
+    """Drag round a knob clockwise, from its top, and hold it for the duration of the block."""
     x, y, radius = middle(dial(page, name))
     mouse = page.page.mouse
     for step in range(11):
@@ -68,7 +69,14 @@ def turn(page: ViserPage, name: str, degrees: float) -> None:
         mouse.move(x + 0.7 * radius * math.sin(angle), y - 0.7 * radius * math.cos(angle))
         if step == 0:
             mouse.down()
+    yield
     mouse.up()
+
+
+def turn(page: ViserPage, name: str, degrees: float) -> None:
+    """Drag round a knob clockwise, from its top."""
+    with turned(page, name, degrees):
+        pass
 
 
 def legend(page: ViserPage, name: str) -> list[float]:

@@ -67,6 +67,43 @@ def test_page_that_has_drawn_makes_no_context_to_see_whether_it_can(page: Page) 
     assert [module(page, path, CONTEXTS, draws) for draws in (True, False)] == [0, 1]
 
 
+# Knobs
+
+
+def test_value_that_came_late_is_sent_again_while_the_hand_holds_the_knob(page: Page) -> None:
+    load(page, "Knobs", "instruments/knob.js")
+    load(page, "Commands", "instruments/command.js")
+    assert page.evaluate(
+        """async () => {
+            const said = [];
+            const command = new Commands.Command("k", (value) => ({ do: "joint", value }), (act) => said.push(act));
+            const options = { title: "Axis 1", low: -90, high: 90, step: 1, full: 1, text: String };
+            const knob = new Knobs.Knob({ ...options, command });
+            document.body.replaceChildren(knob.element);
+            Object.assign(knob.dial.style, { width: "100px", height: "100px" });
+            knob.dial.setPointerCapture = () => {};
+            const point = (type, clientX, clientY) =>
+                knob.dial.dispatchEvent(new PointerEvent(type, { pointerId: 1, clientX, clientY }));
+            const sent = async (count) => {
+                while (said.length < count) await new Promise((later) => setTimeout(later, 5));
+            };
+            const { left, top } = knob.dial.getBoundingClientRect();
+            const refusal = { is: "refused", id: "k", retry: 0.01 };
+            knob.take({ revocations: 7, ticket: 0 }, 0, 0);
+            point("pointerdown", left + 50, top);
+            point("pointermove", left + 100, top + 50);
+            await sent(1);
+            knob.answered(refusal);
+            await sent(2);
+            point("pointerup", left + 100, top + 50);
+            knob.answered(refusal);
+            knob.take({ revocations: 8, ticket: 0 }, 0, 0);
+            await new Promise((later) => setTimeout(later, 60));
+            return [said.map(({ value, revocations }) => [value, revocations]), knob.dial.ariaValueNow];
+        }"""
+    ) == [[[90, 7], [90, 7]], "0.00"]
+
+
 # Pause and Speed
 
 
