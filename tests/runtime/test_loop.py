@@ -195,6 +195,21 @@ def test_copy_of_a_press_names_who_pressed_and_stops_nothing(parts: LoopParts) -
     )  # fmt: skip
 
 
+def test_simulated_arm_is_at_once_where_it_was_in_a_restored_state(parts: LoopParts) -> None:
+    parts.mailbox.put(cmd.Joint(1, 2.0))
+    parts.mailbox.put(cmd.Gripper(0.4))
+    parts.tick(60)
+    moment, course = parts.state, list[list[float]]()
+    parts.tick()
+    course += [parts.state.q.tolist()]
+    parts.tick(200)
+    parts.mailbox.put(cmd.RestoreState(moment))
+    parts.tick()
+    assert parts.state.q.tolist() == course[0]
+    assert parts.state.gripper == parts.state.gripper_setpoint
+    np.testing.assert_array_equal(parts.state.q, parts.state.setpoint)
+
+
 def test_only_after_a_silent_server_a_program_resumes_by_itself(parts: LoopParts) -> None:
     program = Actor(Person("a key", "Anna", Role.OPERATOR), CommandChannel.PROGRAM)
     parts.loop.profile = SilenceProfile.SIMULATION

@@ -75,6 +75,13 @@ class Driver(Protocol):
         """
         ...
 
+    def place(self, q: FloatArray, gripper: float) -> None:
+        """Set a simulated arm without a report to a posture of an earlier run, at once.
+
+        q: (n,) [rad or m]. gripper: the finger joint [rad or m].
+        """
+        ...
+
     def stop(self) -> None:
         """Disconnect from the arm. May be called twice."""
         ...
@@ -130,6 +137,10 @@ class SimulatedDriver:
 
     def freeze(self, t: float) -> None:
         """Do nothing: the arm does nothing by itself."""
+
+    def place(self, q: FloatArray, gripper: float) -> None:
+        """Set the arm to ``q`` (n,) and ``gripper`` [rad or m] at once, within its limits."""
+        self._sent = DriverAnswer(self._clamped(q), self._fingers.clamp(gripper))
 
     def stop(self) -> None:
         """End the motion; ``start`` is needed before the next setpoint."""

@@ -26,7 +26,7 @@ from katana450.arm.runtime.pipes.state_publisher import (
     StatePublisher,
     TicketOutcome,
 )
-from katana450.arm.runtime.tick import TickRecord, failed, stepped, waited
+from katana450.arm.runtime.tick import TickRecord, driven, failed, restores, waited
 from katana450.platform_support import prefer_thread
 
 log = logging.getLogger(__name__)
@@ -114,7 +114,10 @@ class ControlLoop:
             if self._settled and not is_given:
                 state = waited(self._session, before, t, self._driver.send)
             else:
-                state = stepped(self._session, before, commands, t, self._driver.send)
+                state = self._session.step(before, commands, t)
+                if restores(commands, state):
+                    self._driver.place(state.q, state.gripper)
+                state = driven(self._session, state, t, self._driver.send)
         except Exception:
             # The loop continues after any error and the arm holds: the state reports the error.
             log.exception("The control loop met an error; the arm holds.")

@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from katana450.arm.control.commands.commands import Command
+from katana450.arm.control.commands.commands import Command, RestoreState
 from katana450.arm.control.lease import Actor
 from katana450.arm.control.session.checks import FAILED
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.modes import IDLE
-from katana450.arm.control.state.state import Finding, Reason, State
+from katana450.arm.control.state.state import ACCEPTED, Finding, Reason, State
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.maths.motion.limiter import JointMotion
 
@@ -56,6 +56,14 @@ def stepped(session: Session, state: State, commands: list[Command], t: float, s
     Raises any error of the session, and of ``send``.
     """
     return driven(session, session.step(state, commands, t), t, send)
+
+
+def restores(commands: Sequence[Command], state: State) -> bool:
+    """Return whether the tick that ended in ``state`` accepted a state of an earlier run."""
+    return any(
+        isinstance(command, RestoreState) and outcome is ACCEPTED
+        for command, outcome in zip(commands, state.outcomes, strict=True)
+    )
 
 
 def driven(session: Session, state: State, t: float, send: Send) -> State:

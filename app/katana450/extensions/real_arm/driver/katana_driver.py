@@ -149,6 +149,9 @@ class KatanaDriver:
         self._stop_pressed.set()
         self._wake.set()
 
+    def place(self, q: FloatArray, gripper: float) -> None:
+        """Do nothing: the session restores no state of an arm with a report."""
+
     def stop(self) -> None:
         """Stop an arm that moves, and disconnect. Its motors keep holding it."""
         self._ending.set()

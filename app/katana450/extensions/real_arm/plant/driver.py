@@ -148,6 +148,9 @@ class PlantDriver:
     def freeze(self, t: float) -> None:
         """Do nothing: a simulated arm does nothing by itself."""
 
+    def place(self, q: FloatArray, gripper: float) -> None:
+        """Do nothing: the session restores no state of an arm with a report."""
+
     def stop(self) -> None:
         """End the motion; ``start`` is needed before the next setpoint."""
         self._t = None
