@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page
 
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import TaughtPose, taught
-from katana450.extensions.recording.playback.run import Span, at_place, place_of
+from katana450.extensions.recording.files.spans import Span, at_place, place_of
 from tests.browser.bare_page import bare_page, load, module
 
 
@@ -76,7 +76,8 @@ def test_value_that_came_late_is_sent_again_while_the_hand_holds_the_knob(page: 
     assert page.evaluate(
         """async () => {
             const said = [];
-            const command = new Commands.Command("k", (value) => ({ do: "joint", value }), (act) => said.push(act));
+            const request = (value) => ({ do: "joint", value });
+            const command = new Commands.Command("k", request, (act) => said.push(act));
             const options = { title: "Axis 1", low: -90, high: 90, step: 1, full: 1, text: String };
             const knob = new Knobs.Knob({ ...options, command });
             document.body.replaceChildren(knob.element);
@@ -99,7 +100,8 @@ def test_value_that_came_late_is_sent_again_while_the_hand_holds_the_knob(page: 
             knob.answered(refusal);
             knob.take({ revocations: 8, ticket: 0 }, 0, 0);
             await new Promise((later) => setTimeout(later, 60));
-            return [said.map(({ value, revocations }) => [value, revocations]), knob.dial.ariaValueNow];
+            const acts = said.map(({ value, revocations }) => [value, revocations]);
+            return [acts, knob.dial.ariaValueNow];
         }"""
     ) == [[[90, 7], [90, 7]], "0.00"]
 

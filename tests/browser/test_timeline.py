@@ -12,8 +12,9 @@ import pytest
 
 import katana450
 from katana450.client import connect
+from katana450.extensions.recording.files.spans import at_place
 from katana450.extensions.recording.folders import recordings_in
-from katana450.extensions.recording.playback.run import PlaybackRun, at_place
+from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import requests
 from tests.browser.conftest import OpenPage

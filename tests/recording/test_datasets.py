@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,15 +13,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import CommandChannel
+from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import Submission, TickRecord
+from katana450.assembly.robot_session import DescribedRobot
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.recording.datasets.lerobot_export import driven_by_person
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
-from katana450.extensions.recording.files.table import RecordedStates, columns, frame_times, sampled
+from katana450.extensions.recording.files.spans import Span, lasting_spans, length_of
+from katana450.extensions.recording.files.table import (
+    TICK,
+    RecordedStates,
+    columns,
+    frame_times,
+    sampled,
+)
 from katana450.extensions.recording.folders import new_folder
+from katana450.extensions.recording.live.ring import RunEvents
 from katana450.maths.geometry.arrays import FloatArray
 from tests.recording.dataset_files import episode, episode_folder, write_copy
 from tests.recording.lerobot_check import check_dataset, episodes_of, rows_of
@@ -87,6 +98,58 @@ def test_folder_of_episodes_is_a_dataset(
     assert {episode["tasks"][0] for episode in rows} == {"pour the water"}
     assert [episode["length"] for episode in rows] == [1 + int(0.85 * FPS), 1 + int(0.95 * FPS)]
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+def test_what_a_rewind_left_is_in_no_dataset(tmp_path: Path) -> None:
+    """Set an arm back twice, the second time to before the first, and once to another run."""
+    path, events = tmp_path / "run.mcap", RunEvents()
+    begin = described().session.begin(described().session.ready, 0.0, 0.0)
+    states: list[State] = [begin]
+    rewinds = {70: (40, "ring"), 100: (30, ""), 130: (120, "ring"), 150: (10, "opened.mcap")}
+
+    def commands(
+        rng: np.random.Generator, state: State, robot: DescribedRobot
+    ) -> Iterator[cmd.Command]:
+        states.append(state)
+        source, name = rewinds.get(len(states), (None, ""))
+        if source is None:
+            yield from dragging(rng, state, robot)
+        else:
+            yield cmd.RestoreState(states[source], name)
+
+    with path.open("wb") as file:
+        writer = RecordingWriter(file, header())
+
+        def take(record: TickRecord) -> None:
+            named = tuple(Submission(command, ADA) for command, _ in record.submissions)
+            record = record._replace(submissions=named)
+            writer.put(record)
+            for kind, fields in events.of(record):
+                writer.event(record.t, kind, fields)
+
+        run(180, 1, take, commands, odd=False)
+        writer.close()
+    ends = [state.t for state in states]
+    with RecordingFile.open(path) as recording:
+        begin_t, end = recording.start + 0.05, ends[140]
+        spans = lasting_spans(recording, begin_t, end)
+        assert spans == (
+            Span(begin_t, ends[30] + TICK),
+            Span(ends[100], ends[120] + TICK),
+            Span(ends[130], end),
+        )
+        assert lasting_spans(recording, ends[60], ends[90]) == (Span(ends[70], ends[90]),)
+        assert lasting_spans(recording, begin_t, ends[170]) == (Span(ends[150], ends[170]),)
+    part = ("--from", str(0.05), "--to", str(end - recording.start))
+    words = ("--format", "lerobot", "--fps", "100", "--task", "drag")
+    assert export(path, *words, *part, "--out", tmp_path / "set") == 0
+    frames = np.array(rows_of(tmp_path / "set")["observation.state"])
+    assert len(frames) == int(100.0 * length_of(spans) + 1e-6) + 1
+    # The arm moves on across each cut as it does within the limiter.
+
+    # The arm moves across each cut as it does in any tick.
+    speed = described().robot.require_arm().limits.speed
+    assert (np.abs(np.diff(frames[:, :5], axis=0)) <= 0.0101 * speed).all()
 
 
 def test_frames_tell_whether_a_person_drove(tmp_path: Path) -> None:

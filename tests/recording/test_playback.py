@@ -39,6 +39,13 @@ from katana450.extensions.recording.files.recording_file import (
     utc_offset_ns,
 )
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.files.spans import (
+    Span,
+    at_place,
+    length_of,
+    place_of,
+    spans_of,
+)
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.live.ring import Ring
@@ -48,14 +55,7 @@ from katana450.extensions.recording.playback import store
 from katana450.extensions.recording.playback.marks import Mark, add_marks
 from katana450.extensions.recording.playback.routes import PlaybackRoutes, difference
 from katana450.extensions.recording.playback.rows import still_flying
-from katana450.extensions.recording.playback.run import (
-    PlaybackRun,
-    Span,
-    at_place,
-    length_of,
-    place_of,
-    spans_of,
-)
+from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.playback.store import RecordingStore, opened
 from katana450.maths.geometry import se3, so3
 from katana450.maths.water.flow import VesselMove, Water, WaterFlow

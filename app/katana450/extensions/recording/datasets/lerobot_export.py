@@ -30,6 +30,7 @@ from katana450.extensions.recording.episodes.episode import JUDGED, EpisodeOutco
 from katana450.extensions.recording.episodes.episode_folder import episodes_in
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import check_whole, given_commands
+from katana450.extensions.recording.files.spans import Span, at_place, lasting_spans, length_of
 from katana450.extensions.recording.files.table import (
     RecordedStates,
     check_fps,
@@ -117,19 +118,26 @@ class EpisodeCut:
 
     Attributes:
         path: the recording.
-        start, end: the part, on the clock of the recording [s].
+        spans: the parts of the recording that it consists of, on its clock [s].
         task: what was to be done, in words.
         success: whether it was done; None if nobody has judged that.
     """
 
     path: Path
-    start: float
-    end: float
+    spans: tuple[Span, ...]
     task: str
     success: bool | None
 
     def __str__(self) -> str:
-        return f"{self.path} from {self.start:.3f} to {self.end:.3f} s"
+        return f"{self.path} from {self.spans[0].start:.3f} to {self.spans[-1].end:.3f} s"
+
+    def frames(self, fps: int) -> FloatArray:
+        """Return the times (N,) [s] of its frames, 1 / ``fps`` apart, after its start."""
+        return frame_times(0.0, length_of(self.spans), fps)
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """Return the times on the clock of the recording [s] at ``times`` after its start."""
+        return np.array([at_place(self.spans, t) for t in times.tolist()])
 
 
 def files_of(paths: Sequence[Path]) -> list[Path]:
@@ -166,7 +174,7 @@ def cuts_in(
     episodes = episodes_in(file)
     if not episodes:
         start, end = (min(file.start + episode, file.end) for episode in part)
-        yield EpisodeCut(file.path, start, end, _task(task, file), None)
+        yield EpisodeCut(file.path, lasting_spans(file, start, end), _task(task, file), None)
         return
     if part[0] > 0.0 or file.start + part[1] < file.end:
         raise InputError(
@@ -190,7 +198,8 @@ def cuts_in(
                 episode.outcome is EpisodeOutcome.SUCCESS if episode.outcome in JUDGED else None
             )
             task_text = _task(episode.task or task, file, episode.number)
-            yield EpisodeCut(file.path, episode.start, episode.end, task_text, success)
+            spans = lasting_spans(file, episode.start, episode.end)
+            yield EpisodeCut(file.path, spans, task_text, success)
 
 
 def _task(task: str, file: RecordingFile, number: int | None = None) -> str:
@@ -298,7 +307,7 @@ def export_lerobot(
     first = _sampled_episode(cuts[0], options.fps)
     joints = first.state.shape[1] - first.gripper
     shape = DatasetShape(robot, joints, first.gripper, options.fps, options.views, options.size)
-    count = sum(len(frame_times(cut.start, cut.end, options.fps)) for cut in cuts)
+    count = sum(len(cut.frames(options.fps)) for cut in cuts)
     with ExitStack() as stack:
         folder = stack.enter_context(new_folder(out))
         writer = LerobotWriter(folder, shape)
@@ -345,8 +354,9 @@ def _cuts(paths: Sequence[Path], options: LerobotOptions) -> tuple[list[EpisodeC
             with RecordingFile.open(path) as file:
                 check_same_robot(first, file)
                 for cut in cuts_in(file, options.task, options.outcomes, options.part):
-                    check_whole(file, cut.start, cut.end)
-                    if len(frame_times(cut.start, cut.end, options.fps)) < MIN_FRAMES:
+                    for span in cut.spans:
+                        check_whole(file, *span)
+                    if len(cut.frames(options.fps)) < MIN_FRAMES:
                         raise InputError(
                             f"{cut} has fewer than {MIN_FRAMES} frames at {options.fps} a second. "
                             "Leave it out, or choose more frames per second."
@@ -362,12 +372,12 @@ def _cuts(paths: Sequence[Path], options: LerobotOptions) -> tuple[list[EpisodeC
 
 def _sampled_episode(cut: EpisodeCut, fps: int) -> _Episode:
     with RecordingFile.open(cut.path) as file:
-        table = columns_from(file, cut.start, cut.end)
-        times = frame_times(cut.start, cut.end, fps)
+        table = columns_from(file, cut.spans[0].start, cut.spans[-1].end)
+        times = cut.at(cut.frames(fps))
         by_person = driven_by_person(file, times)
     # The action of a frame is the setpoint of the next one: that of the same time would be the
     # state itself where a driver follows without delay.
-    later = np.minimum(times + 1.0 / fps, cut.end)
+    later = cut.at(cut.frames(fps) + 1.0 / fps)
     gripper = "position" in table
     state = [sampled(table["t"], table["q"], times)]
     action = [sampled(table["t"], table["setpoint"], later)]
@@ -403,5 +413,4 @@ def _states(cuts: Sequence[EpisodeCut], fps: int, session: Session) -> Iterator[
     """Yield the states of all frames of all episodes."""
     for cut in cuts:
         with RecordingFile.open(cut.path) as file:
-            times = frame_times(cut.start, cut.end, fps)
-            yield from RecordedStates(file, session).at(times)
+            yield from RecordedStates(file, session).at(cut.at(cut.frames(fps)))

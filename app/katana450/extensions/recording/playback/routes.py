@@ -22,10 +22,10 @@ from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.recording.files.simulation import state_after
+from katana450.extensions.recording.files.spans import at_place, length_of, place_of
 from katana450.extensions.recording.messages import StateRow
 from katana450.extensions.recording.playback.drawing import CONTEXTS, PlaybackWindows
 from katana450.extensions.recording.playback.rows import RecordedMoment
-from katana450.extensions.recording.playback.run import at_place, length_of, place_of
 from katana450.extensions.recording.playback.store import (
     MAX_FILE_BYTES,
     RING,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from bisect import bisect_right
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from katana450.extensions.recording.files.simulation import (
     content_of,
     recorded_input,
 )
+from katana450.extensions.recording.files.spans import Span, spans_of
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     EPISODES,
@@ -34,57 +35,6 @@ from katana450.extensions.recording.playback.rows import (
     description,
 )
 from katana450.extensions.recording.ticks import TickInput
-
-MAX_PAUSE = 2.0
-"""[s] Time without a record from which on a new span begins."""
-
-
-class Span(NamedTuple):
-    """A time with records, from ``start`` to ``end`` [s]."""
-
-    start: float
-    end: float
-
-    @property
-    def length(self) -> float:
-        """Its length [s]."""
-        return self.end - self.start
-
-
-def spans_of(parts: Iterable[tuple[float, float]]) -> tuple[Span, ...]:
-    """Return the spans that ``parts``, each with begin and end [s], form in their order."""
-    spans: list[Span] = []
-    for start, end in sorted(parts):
-        if spans and start - spans[-1].end <= MAX_PAUSE:
-            spans[-1] = Span(spans[-1].start, max(spans[-1].end, end))
-        else:
-            spans.append(Span(start, end))
-    return tuple(spans)
-
-
-def at_place(spans: Sequence[Span], place: float) -> float:
-    """Return the time [s] at ``place`` [s] of the axis; that of the nearer end beyond it."""
-    for span in spans:
-        if place <= span.length:
-            return span.start + max(place, 0.0)
-        place -= span.length
-    return spans[-1].end if spans else 0.0
-
-
-def place_of(spans: Sequence[Span], t: float) -> float:
-    """Return the place [s] of ``t`` [s] on the axis; inside a rest, that of its start."""
-    place = 0.0
-    for span in spans:
-        if t < span.start:
-            break
-        place += min(t, span.end) - span.start
-    return place
-
-
-def length_of(spans: Iterable[Span]) -> float:
-    """Return the length [s] of the axis."""
-    return sum(span.length for span in spans)
-
 
 MAX_BLOCKS = 120
 """Number of decoded blocks that are kept, 4 min of motion; each has about 0.2 MB."""

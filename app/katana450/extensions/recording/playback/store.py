@@ -28,11 +28,12 @@ from typing import Any, BinaryIO
 
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
+from katana450.extensions.recording.files.spans import Span
 from katana450.extensions.recording.folders import SUFFIX, recordings_in
 from katana450.extensions.recording.messages import StateRow, TickMessage
 from katana450.extensions.recording.playback.marks import Mark
 from katana450.extensions.recording.playback.rows import RecordedMoment
-from katana450.extensions.recording.playback.run import PlaybackRun, Span
+from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.ticks import TickInput
 from katana450.platform_support import limit_resources, without_interrupts
 
