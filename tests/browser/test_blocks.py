@@ -199,6 +199,7 @@ def test_step_is_dragged_into_a_block(sheet: ViserPage, touch: bool) -> None:
     wait_text(sheet, SCRIPT.replace("\n  - home", "").replace("        - wait", home))
 
 
+@pytest.mark.long
 def test_mistakes_mark_their_steps_and_lead_to_their_lines(
     sheet: ViserPage, artefacts: Path
 ) -> None:

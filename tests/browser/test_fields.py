@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from playwright.sync_api import Locator
 
 from tests.browser.page import ViserPage
@@ -85,6 +86,7 @@ def test_value_is_sent_on_enter_or_by_leaving_and_only_in_its_range(
     assert watch.sees(50, 12.5, "Home")
 
 
+@pytest.mark.long
 def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Truth) -> None:
     box = page.number_box("1 base turn")
     home, watch = box.input_value(), Watch(page)
@@ -117,6 +119,7 @@ def test_value_typed_before_a_stop_is_not_sent_after_it(page: ViserPage, truth: 
     assert np.allclose(truth.status()["q"], READY, atol=1e-9)
 
 
+@pytest.mark.long
 def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
     """Assistive technology types as a person does, or sets the value without the focus."""
     for label, index, text in (("Gripper", 0, "35"), ("r, p, y", 2, "-12")):

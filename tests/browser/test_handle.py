@@ -139,6 +139,7 @@ def test_control_snaps_and_shift_slows_a_drag(page: ViserPage, truth: Truth) -> 
     assert pitch() - start == pytest.approx(0.06, abs=0.014)
 
 
+@pytest.mark.long
 def test_typed_number_is_the_distance_of_the_drag(
     page: ViserPage, truth: Truth, artefacts: Path
 ) -> None:

@@ -81,6 +81,7 @@ def test_pads_and_buttons_move_while_they_are_held(
     sheet.page.set_viewport_size(size)
 
 
+@pytest.mark.long
 def test_key_is_released_where_the_focus_has_moved_to(sheet: ViserPage, truth: Truth) -> None:
     sheet.page.click("#more-button")
     sheet.page.evaluate("() => document.activeElement.blur()")

@@ -80,6 +80,7 @@ def test_run_that_is_stopped_during_planning_ends_with_the_reason(
         client.clear_stop()
 
 
+@pytest.mark.long
 def test_plan_is_followed_at_a_fraction_of_its_speed(
     shoulder_arm: katana450.Arm, client: katana450.Client
 ) -> None:

@@ -87,6 +87,7 @@ def volume_in_cup(state: State) -> int:
     return state.poured.water.cup.volume
 
 
+@pytest.mark.long
 def test_stopped_pour_loses_no_drop_and_is_completed(
     stage: Stage, pour: Program, course: Course
 ) -> None:

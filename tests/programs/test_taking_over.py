@@ -10,7 +10,7 @@ from tests.conftest import LONG
 from tests.programs.conftest import TICK, Stage
 from tests.programs.test_continuation import SCRIPT
 
-TAKEOVERS = 10_000 if LONG else 15
+TAKEOVERS = 10_000 if LONG else 8
 TICKS_AFTER = 60
 
 

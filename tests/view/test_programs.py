@@ -170,6 +170,7 @@ steps:
 """
 
 
+@pytest.mark.long
 def test_preview_shows_cup_and_water_at_the_time(
     server: viser.ViserServer, robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
