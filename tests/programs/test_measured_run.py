@@ -13,7 +13,6 @@ from katana450.extensions.programs.run.simulation import (
 )
 from katana450.extensions.programs.script.measures import (
     MEASURES,
-    OF_A_MEASURED_ARM,
     MeasuredRun,
     nearest_points,
     path_of,
@@ -59,8 +58,7 @@ def line() -> tuple[Planned, Simulation, MeasuredRun]:
 
 def test_known_lag_and_errors_are_found(line: tuple[Planned, Simulation, MeasuredRun]) -> None:
     plan, simulation, run = line
-    assert set(run.values) == OF_A_MEASURED_ARM
-    assert set(MEASURES) > OF_A_MEASURED_ARM
+    assert set(run.values) < set(MEASURES)
     # Constant angles beside the setpoints are no lag.
     assert run.values["tracking_lag_ms"] == pytest.approx(10.0 * TICKS, abs=3.0)
     assert run.values["joint_tracking_error_deg"] == pytest.approx(np.degrees(0.01))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import math
 import re
 from argparse import Namespace
@@ -33,8 +32,6 @@ from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, client_of
 from katana450.server.web.authenticator import TOKEN_REQUIRED, Authenticator
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
-
-log = logging.getLogger(__name__)
 
 QUERY_SUBJECTS = ("state", "arm", "branches", "loop", "objects", "world", "program_plan")
 """Subjects of the request ``query``. Each has a URL path of its own for GET."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import math
 import secrets
 import socket
@@ -44,8 +43,6 @@ from katana450.server.web.channel import (
     JsonChannel,
     WebSocketJsonChannel,
 )
-
-log = logging.getLogger(__name__)
 
 REQUESTS = 400.0, 800.0
 """Maximum rate [1/s] and burst of requests: a stream may be faster than the ticks of the arm."""

@@ -47,17 +47,6 @@ MEASURES: Final = {
 }
 """Name of each measure, with its unit at the end, and its definition."""
 
-OF_A_MEASURED_ARM: Final = frozenset(
-    (
-        "measured_position_error_mm",
-        "measured_rms_error_mm",
-        "tool_tracking_error_mm",
-        "joint_tracking_error_deg",
-        "tracking_lag_ms",
-    )
-)
-"""Measures of an arm that is measured beside its setpoints."""
-
 UNITS: Final = {
     "_m_s3": "m/s³",
     "_mm_s": "mm/s",
