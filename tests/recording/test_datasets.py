@@ -286,6 +286,7 @@ def test_odd_input_is_refused(
         "1 to 100 frames per second, not 0": (run, *lerobot, "--fps", "0"),
         "1 to 100 frames per second, not 101": (run, *lerobot, "--fps", "101"),
         "--from and --to cut recordings": (untold, *lerobot, "--from", "1"),
+        "Only lerobot takes several files": (run, other, "--out", out),
         "cut one recording": (run, run, *lerobot, "--to", "1"),
         "cannot be read": (tmp_path / "none.mcap", *lerobot),
         "exists already": (run, *lerobot[:-1], empty),

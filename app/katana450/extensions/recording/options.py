@@ -107,7 +107,7 @@ def _add_export_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         metavar="FILE",
-        help="recordings; for lerobot also folders of episodes",
+        help="a recording; for lerobot several, and folders of episodes",
     )
     listed = "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
     parser.add_argument(

@@ -5,10 +5,8 @@ from __future__ import annotations
 import json
 import math
 import sys
-import tempfile
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -230,7 +228,9 @@ def export(options: Namespace) -> object:
     """Write the file or folder; return what it has, in words. Raises KatanaError."""
     if options.format == "lerobot":
         return _lerobot(options)
-    with _joined(options.files) as file:
+    if len(options.files) > 1:
+        raise InputError("Only lerobot takes several files. Join those of one run: `record trim`.")
+    with RecordingFile.open(options.files[0]) as file:
         start, end = file.start + options.start, min(file.start + options.end, file.end)
         if start > end:
             raise InputError(
@@ -299,17 +299,3 @@ def _lerobot(options: Namespace) -> Exported:
         robot = session_for(first, options.urdf)
         pictures = PictureViews(views, size, options.urdf, first.settings.bare)
     return export_lerobot(options.files, options.out, request, robot.session, pictures.pictures)
-
-
-@contextmanager
-def _joined(paths: Sequence[Path]) -> Iterator[RecordingFile]:
-    """Yield the recording of ``paths``; several of one run are joined."""
-    if len(paths) == 1:
-        with RecordingFile.open(paths[0]) as file:
-            yield file
-        return
-    with tempfile.TemporaryDirectory(prefix="katana450-") as folder:
-        path = Path(folder) / paths[0].name
-        trim(paths, path, -math.inf, math.inf)
-        with RecordingFile.open(path) as file:
-            yield file
