@@ -17,7 +17,7 @@ from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import Reason, State
 from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import find_robot
+from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.extensions.hands.sides import with_sides
 from katana450.extensions.programs.run.simulation import Planned, run_by_clock
 from katana450.maths.geometry import se3
@@ -132,6 +132,13 @@ def test_opened_jaw_leaves_the_part_standing(plan: Planned, before: State) -> No
     assert abs(free.objects[0].T[2, 3]) < 1e-3
 
 
+def with_hand(folder: Path, hand: Any) -> DescribedRobot:
+    """Return a UR5e with ``hand``, read from a file in ``folder``."""
+    path = folder / "arm.urdf"
+    path.write_text(hand_urdf("UR5e", hand), encoding="utf-8")
+    return find_robot(Settings(), path, None)
+
+
 @pytest.mark.parametrize(
     ("hand", "gripper", "slides"),
     [(ROBOTIQ_2F_85, (0.8, 0.0, 2.0), False), (RADIAL, (0.0, 0.04, 0.1), True)],
@@ -139,18 +146,14 @@ def test_opened_jaw_leaves_the_part_standing(plan: Planned, before: State) -> No
 def test_answer_and_description_name_the_closed_end_first(
     tmp_path: Path, hand: Any, gripper: tuple[float, ...], slides: bool
 ) -> None:
-    path = tmp_path / "arm.urdf"
-    path.write_text(hand_urdf("UR5e", hand), encoding="utf-8")
-    robot, session, _ = find_robot(Settings(), path, None)
+    robot, session, _ = with_hand(tmp_path, hand)
     handle = cast("ArmHandle", SimpleNamespace(robot=robot, session=session))
     answer = serialize.arm(handle)
     assert (answer.gripper, answer.gripper_slides) == (gripper, slides)
 
 
 def test_hand_that_is_not_understood_closes_at_the_lower_end(tmp_path: Path) -> None:
-    path = tmp_path / "arm.urdf"
-    path.write_text(hand_urdf("UR5e", RADIAL), encoding="utf-8")
-    robot, session, _ = find_robot(Settings(), path, None)
+    robot, session, _ = with_hand(tmp_path, RADIAL)
     hand = session.environment.hand
     assert hand is not None
     assert hand.sides == (("digit_1",), ("digit_2",), ("digit_3",))
@@ -158,9 +161,7 @@ def test_hand_that_is_not_understood_closes_at_the_lower_end(tmp_path: Path) -> 
 
 
 def test_hand_with_one_moving_link_holds_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "arm.urdf"
-    path.write_text(hand_urdf("UR5e", HOOK), encoding="utf-8")
-    _, session, _ = find_robot(Settings(), path, None)
+    _, session, _ = with_hand(tmp_path, HOOK)
     hand = session.environment.hand
     assert hand is not None
     assert hand.sides == (("hook",),)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,20 @@ def client(server: AppServer) -> Iterator[katana450.Client]:
         yield connected
 
 
+def refused_run(run: Callable[[], object]) -> tuple[threading.Thread, list[RefusedError]]:
+    """Start ``run``, which is to be refused, in a thread; return also where the refusal comes."""
+    refused: list[RefusedError] = []
+
+    def refusal() -> None:
+        with pytest.raises(RefusedError) as raised:
+            run()
+        refused.append(raised.value)
+
+    running = threading.Thread(target=refusal)
+    running.start()
+    return running, refused
+
+
 def test_plan_is_followed_to_its_end(shoulder_arm: katana450.Arm, client: katana450.Client) -> None:
     plan = shoulder_arm.line(by=(0.0, 0.0, -0.05))
     state = plan.run(client)
@@ -58,15 +72,7 @@ def test_run_that_is_stopped_during_planning_ends_with_the_reason(
     client: katana450.Client, server: AppServer
 ) -> None:
     turns = "".join(f"  - joints: [{k}, -68, 85, 8, {-k}]\n" for k in range(1, 100))
-    refused: list[RefusedError] = []
-
-    def run() -> None:
-        with pytest.raises(RefusedError) as raised:
-            client.run(f"steps:\n{turns}")
-        refused.append(raised.value)
-
-    running = threading.Thread(target=run)
-    running.start()
+    running, refused = refused_run(lambda: client.run(f"steps:\n{turns}"))
     with katana450.connect(server.url, name="Onlooker") as onlooker:
         for state in onlooker.states(50.0):
             assert running.is_alive(), refused
@@ -130,15 +136,7 @@ def test_stop_that_is_cleared_at_once_ends_the_run(
     plan = shoulder_arm.plan([2.0, -1.0, 1.4, 0.3, 0.0], [-2.0, -1.0, 1.4, 0.3, 0.0])
     to_start = where == "on the way to the start"
     client.joints(plan.end if to_start else plan.start)
-    refused: list[RefusedError] = []
-
-    def run() -> None:
-        with pytest.raises(RefusedError) as raised:
-            plan.run(client)
-        refused.append(raised.value)
-
-    running = threading.Thread(target=run)
-    running.start()
+    running, refused = refused_run(lambda: plan.run(client))
     with katana450.connect(server.url, name="Onlooker") as onlooker:
         for state in onlooker.states(50.0):
             assert running.is_alive(), refused

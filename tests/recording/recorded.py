@@ -92,13 +92,17 @@ def random_commands(
             with suppress(KatanaError):
                 yield cmd.Follow(plan_to(session.session.require_arm(), world, state, goal))
     elif kind < 0.6:
-        p = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
-        yield cmd.Position(p)
-        DRAGGED[id(rng)] = np.clip(
-            p + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
-        )
+        yield from drag(rng)
     elif kind < 0.7:
         yield from seldom_commands(rng, session)
+
+
+def drag(rng: np.random.Generator) -> Iterator[cmd.Command]:
+    """Yield the next sample of the drag of ``rng``."""
+    p = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
+    yield cmd.Position(p)
+    around = p + 0.01 * rng.normal(size=3)
+    DRAGGED[id(rng)] = np.clip(around, (0.05, -0.4, -0.26), (0.5, 0.4, 0.3))
 
 
 def seldom_commands(rng: np.random.Generator, session: DescribedRobot) -> tuple[cmd.Command, ...]:
@@ -174,11 +178,7 @@ def dragging(
 ) -> Iterator[cmd.Command]:
     """Yield a drag in 60 % of all ticks, without a pause, as a restless hand sends it."""
     if rng.random() < 0.6:
-        p = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
-        yield cmd.Position(p)
-        DRAGGED[id(rng)] = np.clip(
-            p + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
-        )
+        yield from drag(rng)
 
 
 def header(

@@ -240,17 +240,24 @@ def test_csv_is_a_motion_that_export_plays(
     assert records[0].t + 0.4 < table["t"][0]
 
 
-def test_file_without_an_end_is_read_as_far_as_it_was_written(
-    records: list[TickRecord], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "running.mcap"
+def chunked(path: Path, records: list[TickRecord], *, ended: bool) -> bytes:
+    """Write three chunks of 20 ticks to ``path``, with an end or without; return its content."""
     with path.open("wb") as opened:
         writer = RecordingWriter(opened, header())
         for number in range(3):
             for record in records[20 * number : 20 * number + 20]:
                 writer.put(record)
             writer.flush()
-    content = path.read_bytes()
+        if ended:
+            writer.close()
+    return path.read_bytes()
+
+
+def test_file_without_an_end_is_read_as_far_as_it_was_written(
+    records: list[TickRecord], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "running.mcap"
+    content = chunked(path, records, ended=False)
     with RecordingFile.open(path) as file:
         begins = [chunk.offset for chunk in file.chunks]
         last = file.messages_of(file.chunks[-1], COMMANDS)
@@ -277,14 +284,7 @@ def test_file_without_an_end_is_read_as_far_as_it_was_written(
 
 def test_parts_beside_a_damaged_chunk_are_read(records: list[TickRecord], tmp_path: Path) -> None:
     path = tmp_path / "damaged.mcap"
-    with path.open("wb") as opened:
-        writer = RecordingWriter(opened, header())
-        for number in range(3):
-            for record in records[20 * number : 20 * number + 20]:
-                writer.put(record)
-            writer.flush()
-        writer.close()
-    content = bytearray(path.read_bytes())
+    content = bytearray(chunked(path, records, ended=True))
     with RecordingFile.open(path) as file:
         place, start = file.chunks[2].offset + 200, file.chunks[2].start
     content[place] ^= 255
