@@ -5,6 +5,7 @@ import { queryOf, request } from "../server.js";
 /** @typedef {[t: number, kind: string, words: string]} Mark */
 /** @typedef {{ t: number[], joints: number[], slides: number[], tool: number[] }} Difference */
 const API = "api/v1/playback";
+export const RING = "ring"; // name of the last minutes
 
 /** Return the answer, or null if it has no content. Throws an error with the reason for a refusal. @param {string} url @param {RequestInit} [options] */
 export async function answered(url, options) {

@@ -2,6 +2,7 @@
 import { save, timestamp } from "../dom.js";
 import { messageOf, queryOf, request } from "../server.js";
 import { ScriptRun } from "../teach/run.js";
+import { RING } from "./api.js";
 import { lengthOf, placeOf } from "./axis.js";
 import { Work } from "./work.js";
 
@@ -78,7 +79,22 @@ export class Selection {
   // Export the part as the format `what`, or verify it. `words` says what is done.
   /** @param {Part | null} part @param {string} what @param {string} words */
   process(part, what, words) {
-    if (part) this.#work.start(what, part, words);
+    if (part && what === "episode") this.#keep(part);
+    else if (part) this.#work.start(what, part, words);
+  }
+
+  // Keep the part as an episode that succeeded.
+  /** @param {Part} part */
+  async #keep({ of, from, to }) {
+    const { toast, name } = this.#page;
+    if (of !== RING) return toast("Episodes are kept from the last minutes, not from a file.");
+    try {
+      const body = JSON.stringify({ do: "keep", start: from, end: to });
+      const answer = await request(`api/v1/episodes?page=${name}`, { method: "POST", body });
+      toast(`Episode ${(await answer.json()).number} is kept as a success.`);
+    } catch (error) {
+      toast(messageOf(error));
+    }
   }
 
   /** Drive the arm along the motion of the part, as a program that the bar shows and steers. @param {Part | null} part */

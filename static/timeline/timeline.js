@@ -10,7 +10,6 @@ import { Plot } from "./plot.js";
 import { NOTHING, Selection } from "./selection.js";
 
 /** @typedef {{ of: string, begin: number, spans: api.Span[], mine: number }} SecondRun */
-const RING = "ring";
 const REFRESH = 3000; // ms between two looks at what was recorded meanwhile
 const [STEP, LONG_STEP] = [0.1, 1]; // s of the arrow keys, and with Shift
 const NEAR = 0.15; // s, within which a mark is at a moment
@@ -27,8 +26,8 @@ export class Timeline {
   #part;
   #plot;
   #selection;
-  #of = RING; // the recording
-  #names = new Map([[RING, "Last minutes"]]);
+  #of = api.RING; // the recording
+  #names = new Map([[api.RING, "Last minutes"]]);
   /** @type {api.Span[]} */
   #spans = [];
   /** @type {api.Mark[]} */
@@ -188,7 +187,7 @@ export class Timeline {
       const place = (this.#t === null ? lengthOf(this.#spans) : placeOf(this.#spans, this.#t)) + sign * (event.shiftKey ? LONG_STEP : STEP);
       this.#seek(atPlace(this.#spans, place));
     } else if (event.key === "Home") this.#seek(this.#spans[0]?.[0] ?? 0);
-    else if (event.key === "End") this.#of === RING ? this.live() : this.#seek(this.#spans.at(-1)?.[1] ?? 0);
+    else if (event.key === "End") this.#of === api.RING ? this.live() : this.#seek(this.#spans.at(-1)?.[1] ?? 0);
     else if (event.key === "Enter") event.repeat || this.#play(this.#playing === null);
     else return;
     event.preventDefault();
@@ -220,9 +219,9 @@ export class Timeline {
     this.#selection.clear();
     [this.#of, this.#spans, this.#marks, this.#failed] = [of, [], [], false];
     await this.#refresh();
-    if (this.#failed && of !== RING) return this.#choose(RING); // the server no longer has it
+    if (this.#failed && of !== api.RING) return this.#choose(api.RING); // the server no longer has it
     this.#list();
-    if (of !== RING && this.#spans.length) this.#seek(this.#spans[0][0]);
+    if (of !== api.RING && this.#spans.length) this.#seek(this.#spans[0][0]);
   }
 
   /** @param {string} choice */
@@ -249,9 +248,9 @@ export class Timeline {
   #list() {
     const { of, second } = this.#part;
     const may = this.#page.store.status?.role !== "viewer";
-    const opened = () => [...this.#names].filter(([name]) => name !== RING).map(([name, words]) => option(name, words));
+    const opened = () => [...this.#names].filter(([name]) => name !== api.RING).map(([name, words]) => option(name, words));
     const file = () => (may ? [option("file", "Open a file…")] : []);
-    of.replaceChildren(option(RING, this.#names.get(RING) ?? ""), ...opened(), ...file());
+    of.replaceChildren(option(api.RING, this.#names.get(api.RING) ?? ""), ...opened(), ...file());
     of.value = this.#of;
     second.replaceChildren(option("", "Compare…"), option("here", "from here on"), ...opened(), ...file());
     second.value = this.#second ? (this.#names.has(this.#second.of) && this.#second.of !== this.#of ? this.#second.of : "here") : "";

@@ -12,7 +12,8 @@ import pytest
 
 import katana450
 from katana450.client import connect
-from katana450.extensions.recording.files.spans import at_place
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.spans import at_place, lasting_spans
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.maths.geometry.arrays import FloatArray
@@ -107,6 +108,15 @@ def place(page: ViserPage, value: float, name: str = NOW) -> None:
     )
 
 
+def check_kept(episodes: Path) -> None:
+    """Check that the only file of ``episodes`` is whole, and that a rewind left a part of it."""
+    (kept,) = map(katana450.open, episodes.glob("episode-*.mcap"))
+    assert kept.verify().identical
+    with RecordingFile.open(kept.path) as file:
+        first, second = lasting_spans(file, kept.start, kept.end)
+    assert first.end < second.start
+
+
 def test_past_is_shown_in_one_window_until_stop(
     server: AppServer, folder: Path, open_page: OpenPage, artefacts: Path
 ) -> None:
@@ -165,6 +175,11 @@ def test_past_is_shown_in_one_window_until_stop(
     truth.wait(moving=False)
     assert truth.status()["q"][0] == pytest.approx(TURNS[0], abs=1e-6)
     page.page.locator("#timeline .marks i[title*='Continues from']").wait_for(state="attached")
+    # What was before and after it is an episode, without what it was set back over.
+    page.page.get_by_label("Export the selection").select_option("episode")
+    page.page.get_by_text("is kept as a success").wait_for()
+    page.keep(artefacts / "timeline-episode.png")
+    check_kept(folder.parent / "episodes")
 
     place(page, 0.0)
     page.wait_until(lambda: page.shows(GHOST), "the recorded arm")

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+import katana450
 from katana450.client.files import EpisodeClient, LostError, Site
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes import running_episode
@@ -52,6 +53,25 @@ def test_request_for_an_episode_that_has_ended_reaches_no_other(bench: Bench) ->
     bench.ask(do="stop", number=2)
     assert bench.folder.find(1).episode.outcome is EpisodeOutcome.SUCCESS
     assert bench.folder.find(2).episode.outcome is EpisodeOutcome.UNJUDGED
+
+
+def test_part_of_the_last_minutes_is_kept_while_an_episode_runs(bench: Bench) -> None:
+    bench.move(50)
+    bench.ask(do="start", task="pick")
+    bench.move(150)
+    offset = 1e-9 * int(bench.header.metadata["utc_offset_ns"])
+    start, end = 1000.5 + offset, bench.t + offset
+    kept = bench.ask(do="keep", start=start, end=end + 60.0)
+    assert (kept["number"], kept["outcome"], kept["task"]) == (2, "success", "pick")
+    (opened,) = (katana450.open(file.path) for file in bench.folder.kept())
+    assert (opened.start, opened.end) == pytest.approx((1000.5, bench.t), abs=1e-6)
+    assert opened.verify().identical
+    with pytest.raises(InputError, match="before its start"):
+        bench.ask(do="keep", start=end, end=start)
+    with pytest.raises(InputError, match="There is nothing"):
+        bench.ask(do="keep", start=start - 600.0, end=start - 300.0)
+    assert bench.ask(do="stop")["number"] == 1
+    assert numbers(bench) == ([1, 2], [])
 
 
 def test_judgements_are_in_the_last_minutes_too(bench: Bench) -> None:

@@ -417,6 +417,22 @@ class EpisodeActs:
                 ended first.
         """
 
+    def keep(
+        self,
+        start: float,
+        end: float,
+        outcome: Literal["unjudged", "success", "failure"] = ...,
+        task: str | None = ...,
+    ) -> int:
+        """Keep a part of the last minutes, as a correction after a failure, as an episode.
+
+        Args:
+            start: Its first moment, as the timeline counts [s since the epoch].
+            end: Its last moment [s since the epoch].
+            outcome: Its outcome.
+            task: What was done; None for that of the last episode.
+        """
+
     def describe(self, number: int, task: str | None = ..., note: str | None = ...) -> int:
         """Change the texts of an episode.
 

@@ -98,6 +98,22 @@ class RerecordEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="rerecord")
     number: Number | None = None
 
 
+class KeepEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="keep"):
+    """Keep a part of the last minutes, as a correction after a failure, as an episode.
+
+    Attributes:
+        start: Its first moment, as the timeline counts [s since the epoch].
+        end: Its last moment [s since the epoch].
+        outcome: Its outcome.
+        task: What was done; None for that of the last episode.
+    """
+
+    start: float
+    end: float
+    outcome: Judgement = "success"
+    task: Task | None = None
+
+
 class DescribeEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="describe"):
     """Change the texts of an episode.
 
@@ -133,6 +149,7 @@ AnyEpisodeRequest = (
     | DiscardEpisode
     | RestoreEpisode
     | RerecordEpisode
+    | KeepEpisode
     | DescribeEpisode
     | TrimEpisode
 )

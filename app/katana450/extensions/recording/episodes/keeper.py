@@ -36,6 +36,7 @@ from katana450.server.api.episode_requests import (
     DiscardEpisode,
     EpisodeRequest,
     JudgeEpisode,
+    KeepEpisode,
     RerecordEpisode,
     RestoreEpisode,
     StartEpisode,
@@ -66,11 +67,12 @@ class EpisodeKeeper:
             folder: the folder of episodes.
             ring: the ring that is written in this process.
             ring_folder: its folder.
-            run: text that names this run of the server, as in the metadata of its recordings.
+            run: nanoseconds to add to the times of this run for those since the epoch, as in the
+                metadata of its recordings.
             clock: the clock of the recording [s].
         """
         self._folder, self._ring, self._ring_folder = folder, ring, ring_folder
-        self._clock = clock
+        self._clock, self._utc_offset = clock, 1e-9 * int(run)
         self._requests = threading.Lock()
         self._changed = threading.Condition()
         self._notice = ""
@@ -183,6 +185,18 @@ class EpisodeKeeper:
                 episode = self._move(number, discard=False)
             case RerecordEpisode(number=number):
                 episode = self._rerecord(number, by, t)
+            case KeepEpisode(start=start, end=end):
+                task = self._task if request.task is None else request.task.strip()
+                episode = Episode(
+                    self._folder.next_number(),
+                    task,
+                    start - self._utc_offset,
+                    min(end - self._utc_offset, t),
+                    EpisodeOutcome(request.outcome),
+                    "",
+                    by,
+                )
+                episode = self._described(self._running.keep(episode), kind)
             case DescribeEpisode(number=number, task=task, note=note):
                 texts = {"task": task, "note": note}
                 changes = {name: text for name, text in texts.items() if text is not None}

@@ -277,6 +277,16 @@ class RunningEpisode:
         self._forget(number)
         return episode
 
+    def keep(self, episode: Episode) -> Episode:
+        """Write the file of ``episode``, a part of the ring, and return what the ring has of it.
+
+        Raises InputError.
+        """
+        with self._ring.lock:
+            self._ring.sync()
+        marker = EpisodeMarker(episode, self._ring_folder, "", self._run)
+        return cut_out(self._folder, marker, "kept")
+
     @property
     def retry_due(self) -> bool:
         """True if the time has come to ``save`` again."""
