@@ -110,10 +110,10 @@ def place(page: ViserPage, value: float, name: str = NOW) -> None:
 
 def check_kept(episodes: Path) -> None:
     """Check that the only file of ``episodes`` is whole, and that a rewind left a part of it."""
-    (kept,) = map(katana450.open, episodes.glob("episode-*.mcap"))
-    assert kept.verify().identical
-    with RecordingFile.open(kept.path) as file:
-        first, second = lasting_spans(file, kept.start, kept.end)
+    (recording,) = map(katana450.open, episodes.glob("episode-*.mcap"))
+    assert recording.verify().identical
+    with RecordingFile.open(recording.path) as file:
+        first, second = lasting_spans(file, recording.start, recording.end)
     assert first.end < second.start
 
 

@@ -61,8 +61,8 @@ def test_part_of_the_last_minutes_is_kept_while_an_episode_runs(bench: Bench) ->
     bench.move(150)
     offset = 1e-9 * int(bench.header.metadata["utc_offset_ns"])
     start, end = 1000.5 + offset, bench.t + offset
-    kept = bench.ask(do="keep", start=start, end=end + 60.0)
-    assert (kept["number"], kept["outcome"], kept["task"]) == (2, "success", "pick")
+    episode = bench.ask(do="keep", start=start, end=end + 60.0)
+    assert (episode["number"], episode["outcome"], episode["task"]) == (2, "success", "pick")
     (opened,) = (katana450.open(file.path) for file in bench.folder.kept())
     assert (opened.start, opened.end) == pytest.approx((1000.5, bench.t), abs=1e-6)
     assert opened.verify().identical
