@@ -2,7 +2,7 @@
 import { queryOf, request } from "../server.js";
 
 /** @typedef {[start: number, end: number]} Span */
-/** @typedef {[t: number, kind: string, words: string]} Mark */
+/** @typedef {[t: number, kind: string, words: string, since: number | null]} Mark */
 /** @typedef {{ t: number[], joints: number[], slides: number[], tool: number[] }} Difference */
 const API = "api/v1/playback";
 export const RING = "ring"; // name of the last minutes

@@ -5,6 +5,7 @@ import { addressed } from "../page/words.js";
 import { messageOf } from "../server.js";
 import * as api from "./api.js";
 import { atPlace, lengthOf, placeOf } from "./axis.js";
+import { bars } from "./bars.js";
 import { Controls, option, timeInWords } from "./controls.js";
 import { Plot } from "./plot.js";
 import { NOTHING, Selection } from "./selection.js";
@@ -201,7 +202,7 @@ export class Timeline {
       if (of !== this.#of) return;
       this.#spans = spans;
       const { name = "" } = this.#page.store.status ?? {};
-      this.#marks = marks.map(([t, kind, words]) => [t, kind, addressed(words, name)]);
+      this.#marks = marks.map(([t, kind, words, since]) => [t, kind, addressed(words, name), since]);
       this.#failed = false;
     } catch (error) {
       // Once, not each time, and to a person who looks at it.
@@ -366,20 +367,6 @@ export class Timeline {
     return [timeInWords(t), ...events].join(", ");
   }
 
-  /** Return the bars of the episodes on an axis of this length [s]. @param {number} length */
-  #episodes(length) {
-    const marks = this.#marks.filter(([, kind]) => kind === "episode");
-    return marks.flatMap(([t, , words]) => {
-      const [, name] = /^(Episode \d+) begins/.exec(words) ?? [];
-      if (!name) return [];
-      const [end] = marks.find(([, , other]) => other === `${name} ends`) ?? [Infinity];
-      const bar = html("b", { title: words });
-      const [from, to] = [t, end].map((moment) => (100 * placeOf(this.#spans, moment)) / length);
-      bar.style.cssText = `left: ${from}%; width: ${to - from}%`;
-      return [bar];
-    });
-  }
-
   #drawMarks() {
     const length = lengthOf(this.#spans) || 1;
     const shown = this.#marks.map(([t, kind, words]) => {
@@ -390,7 +377,7 @@ export class Timeline {
       return mark;
     });
     const { events, legend } = this.#part;
-    this.#part.marks.replaceChildren(...this.#episodes(length), ...shown);
+    this.#part.marks.replaceChildren(...bars(this.#marks, this.#spans), ...shown);
     for (const entry of legend.children) entry.toggleAttribute("hidden", !this.#marks.some(([, kind]) => kind === entry.getAttribute("data-kind")));
     // An open list keeps its place.
     if (document.activeElement === events && events.options.length === this.#marks.length + 1) return;

@@ -264,6 +264,17 @@ def test_name_that_comes_after_the_press_is_that_of_the_stop() -> None:
     assert later == []
 
 
+def test_continuation_is_marked_with_the_part_that_it_left() -> None:
+    marks: list[Mark] = []
+    for t, recording in ((8, "ring"), (9, ""), (10, "opened.mcap")):
+        add_marks(marks, [event(t, kind="restore", since=5.5, recording=recording)])
+    assert [(mark.text, mark.since) for mark in marks] == [
+        ("Continues from 2.5 s earlier", 5.5),
+        ("Continues from 3.5 s earlier", 5.5),
+        ("Continues from 5.5 s of a file", None),
+    ]
+
+
 def test_program_is_marked_at_its_begin_and_its_end() -> None:
     marks: list[Mark] = []
     run = {"kind": "program", "name": "Pour", "since": 5.0}

@@ -9,6 +9,7 @@ from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.files.spans import OWN_RUN
 from katana450.extensions.recording.forms import FormError, json_form
 from katana450.extensions.recording.live import ring
 from katana450.extensions.recording.messages import EPISODES
@@ -33,12 +34,13 @@ class Mark(NamedTuple):
     """A mark at ``t`` [s].
 
     Its ``kind`` is stop, clear_stop, driver, program, step, restore, contact, limit or
-    episode.
+    episode. ``since``: moment of the same run to which a restore set the arm back [s].
     """
 
     t: float
     kind: str
     text: str
+    since: float | None = None
 
 
 def add_marks(marks: list[Mark], messages: Iterable[Message]) -> None:
@@ -70,7 +72,9 @@ def _all(messages: Iterable[Message]) -> Iterator[Mark]:
             ("episode", _episode(form)) if message.topic == EPISODES else _event(str(kind), form)
         )
         if words is not None:
-            yield Mark(message.t, words[0], words[1][:MAX_TEXT])
+            since = form.get("since") if form.get("recording") in OWN_RUN else None
+            back = since if isinstance(since, int | float) and since < message.t else None
+            yield Mark(message.t, words[0], words[1][:MAX_TEXT], back)
 
 
 def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
@@ -99,7 +103,7 @@ def _restored(form: Mapping[str, Any]) -> str:
     t, since = form.get("t"), form.get("since")
     if not (isinstance(t, int | float) and isinstance(since, int | float)):
         return "Continues from another moment"
-    if form.get("recording") != "ring":
+    if form.get("recording") not in OWN_RUN:
         return f"Continues from {since:.1f} s of a file"
     return f"Continues from {t - since:.1f} s earlier"
 

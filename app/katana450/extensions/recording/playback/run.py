@@ -150,7 +150,11 @@ class PlaybackRun:
             marks = [mark for file in self._files for mark in self._marks(file)]
             # What follows from scripts and names is written later than it happens.
             marks.sort(key=lambda mark: mark.t)
-            return [entry._replace(t=entry.t + self._offset) for entry in marks[-MAX_MARKS:]]
+            shift = self._offset
+            return [
+                Mark(t + shift, kind, text, None if since is None else since + shift)
+                for t, kind, text, since in marks[-MAX_MARKS:]
+            ]
 
     def at(self, t: float) -> RecordedMoment | None:
         """Return the state at ``t`` [s], or the first one after it; None without states.
