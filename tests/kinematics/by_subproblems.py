@@ -13,8 +13,8 @@ import numpy as np
 from katana450.maths.geometry import screws, se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.water.vectors import Vector, add, cross, dot, norm, scale, sub, vector
-from tests.kinematics.subproblems import subproblem1, subproblem3, subproblem4
+from katana450.maths.water.vectors import Vector, add, norm, scale, sub, vector
+from tests.kinematics.subproblems import cross, dot, subproblem1, subproblem3, subproblem4
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 Line = tuple[Vector, Vector]

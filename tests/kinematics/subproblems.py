@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from katana450 import tolerances
 from katana450.maths.kinematics.turns import wrapped
-from katana450.maths.water.vectors import Vector, cross, dot, norm, perpendicular, sub
+from katana450.maths.water.vectors import Vector, norm, scale, sub
 
 EXACT = 1e-9
 """[m, or the unit of the plane's d] Misfit up to which an answer counts as exact."""
@@ -38,6 +38,21 @@ class Rotations:
     free: bool = False
 
 
+def dot(a: Vector, b: Vector) -> float:
+    """Return the scalar product of `a` and `b`."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Return the vector product a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _perpendicular(a: Vector, omega: Vector) -> Vector:
+    """Return the part of `a` perpendicular to the unit vector `omega`."""
+    return sub(a, scale(dot(a, omega), omega))
+
+
 def _sqrt(radicand: float) -> float:
     return math.sqrt(radicand) if radicand > 0.0 else 0.0
 
@@ -51,7 +66,7 @@ def subproblem1(omega: Vector, r: Vector, p: Vector, q: Vector) -> Rotations:
     """
     u, v = sub(p, r), sub(q, r)
     height = dot(omega, sub(u, v))
-    u, v = perpendicular(u, omega), perpendicular(v, omega)
+    u, v = _perpendicular(u, omega), _perpendicular(v, omega)
     radius_u, radius_v = norm(u), norm(v)
     misfit = math.hypot(height, radius_u - radius_v)
     exact = misfit <= EXACT
@@ -72,7 +87,7 @@ def subproblem3(omega: Vector, r: Vector, p: Vector, q: Vector, delta: float) ->
     """
     u, v = sub(p, r), sub(q, r)
     height = dot(omega, sub(u, v))
-    u, v = perpendicular(u, omega), perpendicular(v, omega)
+    u, v = _perpendicular(u, omega), _perpendicular(v, omega)
     radius_u, radius_v = norm(u), norm(v)
     in_plane = _sqrt((delta - height) * (delta + height))
     near, far = abs(radius_u - radius_v), radius_u + radius_v
@@ -100,7 +115,7 @@ def subproblem4(omega: Vector, r: Vector, p: Vector, h: Vector, d: float) -> Rot
     """
     u = sub(p, r)
     c = d - dot(h, r) - dot(omega, u) * dot(omega, h)
-    u = perpendicular(u, omega)
+    u = _perpendicular(u, omega)
     a, b = dot(h, cross(omega, u)), dot(h, u)
     amplitude = math.hypot(a, b)
     if amplitude <= tolerances.ON_AXIS:

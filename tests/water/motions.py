@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from katana450.extensions.programs.steps.pouring import spill_tilt
+from katana450.extensions.programs.steps.pouring import HALVINGS
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
@@ -67,6 +67,15 @@ def poured(
 def turned_to(final: float, rate: float) -> Callable[[float], float]:
     """Return a tilt over time [s] that rises at ``rate`` [rad/s] to ``final`` [rad] and stays."""
     return lambda t: min(rate * t, final)
+
+
+def spill_tilt(cup: Cylinder, volume: float) -> float:
+    """Return the tilt [rad] from which ``cup`` no longer holds ``volume`` [m^3]."""
+    low, high = 0.0, 0.5 * math.pi
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if cup.holds(middle) <= volume else (middle, high)
+    return low
 
 
 def steady_acceleration(cup: Cylinder, volume: float) -> float:

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.extensions.programs.steps.pouring import spill_tilt
 from katana450.maths.water.cylinder import Cylinder
 from tests.geometry.strategies import repeatable
+from tests.water.motions import spill_tilt
 
 CUP = Cylinder(0.03, 0.087)
 

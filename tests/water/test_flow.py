@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.extensions.programs.steps.pouring import flow_at, spill_tilt, tilt_for
+from katana450.extensions.programs.steps.pouring import flow_at, tilt_for
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import Basin, WaterEnvironment
@@ -40,6 +40,7 @@ from tests.water.motions import (
     over_basin,
     placed,
     poured,
+    spill_tilt,
     steady_acceleration,
     turned_to,
 )

@@ -29,21 +29,6 @@ def scale(k: float, a: Vector) -> Vector:
     return k * a[0], k * a[1], k * a[2]
 
 
-def dot(a: Vector, b: Vector) -> float:
-    """Return the scalar product of `a` and `b`."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    """Return the vector product a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
 def norm(a: Vector) -> float:
     """Return the length of `a`."""
     return math.hypot(*a)
-
-
-def perpendicular(a: Vector, omega: Vector) -> Vector:
-    """Return the part of `a` perpendicular to the unit vector `omega`."""
-    return sub(a, scale(dot(a, omega), omega))

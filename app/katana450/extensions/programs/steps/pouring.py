@@ -59,27 +59,11 @@ def tilt_for(flow: float, volume: float, cup: Cylinder) -> float:
 
     The flow grows with the tilt. The result is pi if the flow is not reached.
     """
-    return _first_tilt(0.0, math.pi, lambda tilt: flow_at(tilt, volume, cup) >= flow)[1]
-
-
-def _first_tilt(low: float, high: float, reached: Callable[[float], bool]) -> tuple[float, float]:
-    """Return the interval [rad] that contains the first tilt from ``low`` that has ``reached``."""
+    low, high = 0.0, math.pi
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if reached(middle) else (middle, high)
-    return low, high
-
-
-def spill_tilt(cup: Cylinder, volume: float) -> float:
-    """Return the tilt [rad] from which ``cup`` no longer holds ``volume`` [m^3].
-
-    Down to half of its capacity the floor stays covered and the answer is an arc tangent.
-    """
-    rise = cup.depth - volume / (math.pi * cup.radius**2)
-    if rise <= 0.5 * cup.depth:
-        return math.atan2(max(rise, 0.0), cup.radius)
-    low = math.atan2(0.5 * cup.depth, cup.radius)
-    return _first_tilt(low, 0.5 * math.pi, lambda tilt: cup.holds(tilt) <= volume)[0]
+        low, high = (low, middle) if flow_at(middle, volume, cup) >= flow else (middle, high)
+    return high
 
 
 EMPTY_TILT: Final = math.radians(120.0)
