@@ -35,7 +35,7 @@ class Card:
     def __init__(self, stack: ExitStack, windows: Windows, *options: str) -> None:
         self.emulator, port = stack.enter_context(emulator_process(*options))
         self.log = Path(stack.enter_context(TemporaryDirectory())) / "exchanges.log"
-        arm = ("--arm", f"tcp://127.0.0.1:{port}", "--arm-log", str(self.log))
+        arm = ("--device", f"tcp://127.0.0.1:{port}", "--arm-log", str(self.log))
         self.server = stack.enter_context(AppServer((*APP, *arm)))
         self.truth = Truth(self.server)
         self._windows = windows

@@ -136,24 +136,16 @@ def test_name_and_file_together_are_refused(capsys: pytest.CaptureFixture[str]) 
     assert "name two robots" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("address", ["tcp://192.0.2.1", "192.0.2.1", "ur5e.urdf"])
-def test_address_of_a_real_arm_is_refused_where_only_names_are_possible(
-    address: str, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("command", ["fk", "serve"])
+@pytest.mark.parametrize("address", ["tcp://192.0.2.1", "192.0.2.1", "/dev/ttyACM0", "ur5e.urdf"])
+def test_address_of_a_real_arm_is_no_name(
+    command: str, address: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit):
-        main(["fk", "--arm", address])
-    assert f"{address!r} is an address or a file" in capsys.readouterr().err
-
-
-@pytest.mark.cases(1)
-@pytest.mark.parametrize("address", ["http://nowhere", "192.0.2.1"])
-def test_the_address_of_a_real_arm_is_no_name(
-    address: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["serve", "--port", "0", "--arm", address]) == 1
+        main([command, "--arm", address])
     said = capsys.readouterr().err
-    assert "is not the address of an arm" in said
-    assert "gallery" not in said
+    assert f"{address!r} is an address or a file" in said
+    assert "by --device" in said
 
 
 @pytest.mark.long

@@ -13,9 +13,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
-from katana450.extensions.leader.motor_bus import (
+from katana450.extensions.motor_bus.packets import (
     BROADCAST,
     HOMING_OFFSET,
+    MAX_POSITION,
+    MIN_POSITION,
     PRESENT_POSITION,
     TORQUE_ENABLE,
     TURN,
@@ -102,6 +104,8 @@ class EmulatedMotors:
 
     def _memory(self, motor: int, address: int, size: int) -> bytes:
         values: dict[Register, int] = {
+            MIN_POSITION: RANGE[0],
+            MAX_POSITION: RANGE[1],
             HOMING_OFFSET: OFFSETS[motor - 1],
             TORQUE_ENABLE: int(self.torque[motor - 1]),
             PRESENT_POSITION: self.position(motor),

@@ -11,19 +11,15 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.leader.joint_map import (
-    JointMap,
-    decoded_calibration,
-    read_calibration,
-)
+from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.leader.leader_command import prepare
-from katana450.extensions.leader.motor_bus import (
+from katana450.extensions.motor_bus.bus import MotorBus, SilentMotorError
+from katana450.extensions.motor_bus.calibration import decoded_calibration, read_calibration
+from katana450.extensions.motor_bus.packets import (
     HOMING_OFFSET,
     PRESENT_POSITION,
-    MotorBus,
     MotorError,
     Packet,
-    SilentLeaderError,
 )
 from katana450.server.api import answers
 from tests.leader.emulated_leader import OFFSETS, RANGE, EmulatedMotors, calibration
@@ -158,6 +154,9 @@ class WiredPort:
         data, self._waiting = self._waiting[:3], self._waiting[3:]
         return data
 
+    def close(self) -> None:
+        pass
+
 
 def test_bus_reads_the_motors_through_noise() -> None:
     port = WiredPort()
@@ -175,9 +174,9 @@ def test_silent_motors_are_named() -> None:
     port = WiredPort()
     port.motors.silent = {2, 4}
     bus = MotorBus(port)
-    with pytest.raises(SilentLeaderError, match="do not answer: 2, 4"):
+    with pytest.raises(SilentMotorError, match="do not answer: 2, 4"):
         bus.read_all((1, 2, 3, 4), PRESENT_POSITION)
-    with pytest.raises(SilentLeaderError, match="do not answer: 4"):
+    with pytest.raises(SilentMotorError, match="do not answer: 4"):
         bus.read(4, HOMING_OFFSET)
 
 

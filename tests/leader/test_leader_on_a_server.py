@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, connect
-from katana450.extensions.leader.joint_map import JointMap, decoded_calibration
+from katana450.extensions.leader.joint_map import JointMap
+from katana450.extensions.motor_bus.calibration import decoded_calibration
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 from tests.waiting import until

@@ -8,9 +8,10 @@ from typing import Any
 
 import msgspec
 
-from katana450.extensions.leader.joint_map import JointMap, decoded_calibration
+from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.leader.leader_command import LeaderRun
-from katana450.extensions.leader.motor_bus import MotorBus
+from katana450.extensions.motor_bus.bus import MotorBus
+from katana450.extensions.motor_bus.calibration import decoded_calibration
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.leader.follower_bench import Bench, ServerState

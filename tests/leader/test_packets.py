@@ -8,14 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.extensions.leader import motor_bus
-from katana450.extensions.leader.motor_bus import (
+from katana450.extensions.motor_bus import packets as motor_bus
+from katana450.extensions.motor_bus.packets import (
     HOMING_OFFSET,
     PRESENT_POSITION,
     TORQUE_ENABLE,
     Packet,
     PacketReader,
-    Register,
 )
 
 WORKED = (
@@ -23,7 +22,7 @@ WORKED = (
     (motor_bus.ping_request(1), "ff ff 01 02 01 fb"),
     (motor_bus.read_request(1, PRESENT_POSITION), "ff ff 01 04 02 38 02 be"),
     (motor_bus.write_request(1, TORQUE_ENABLE, 0), "ff ff 01 04 03 28 00 cf"),
-    (motor_bus.sync_read_request((1, 2), Register(56, 8)), "ff ff fe 06 82 38 08 01 02 36"),
+    (motor_bus.sync_read_request((1, 2), 56, 8), "ff ff fe 06 82 38 08 01 02 36"),
     (Packet(1, 0, bytes((0x18, 0x05))), "ff ff 01 04 00 18 05 dd"),
 )
 

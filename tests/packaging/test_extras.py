@@ -13,10 +13,11 @@ import pytest
 
 from katana450 import extras
 from katana450.cli.main import main
+from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.importers.formats.shape_file import Format
 from katana450.extensions.importers.guarded_reading import answer
 from katana450.extensions.real_arm.driver.katana_driver import driver_of
-from katana450.extensions.real_arm.link import ArmUrl
+from katana450.extensions.real_arm.link import open_arm
 from katana450.extras import MissingExtraError
 from tests.exchange.compressed_gltf import draco_glb
 from tests.exchange.test_threemf import threemf
@@ -51,14 +52,14 @@ def test_each_missing_extra_is_named_with_its_command(
         # The processes of a server send it to each other.
         return str(pickle.loads(pickle.dumps(caught.value)))
 
-    arm = (Namespace(arm="serial:///dev/ttyUSB0", arm_log=None), None, (), 0.0)
+    arm = (Namespace(device="serial:///dev/ttyUSB0", arm_log=None), None, (), 0.0)
     picture = str(tmp_path / "a.png")
     uses: list[tuple[str, str, Callable[[], str]]] = [
         ("embreex", "pictures", lambda: answered("render", "--out", picture)),
         ("robot_descriptions", "gallery", lambda: answered("arms")),
         ("robot_descriptions", "gallery", lambda: answered("serve", "--arm", "ur5e")),
         ("gymnasium", "learn", lambda: refused(run_path, str(LEARN))),
-        ("serial", "serial", lambda: refused(ArmUrl("/dev/ttyUSB0", None).open)),
+        ("serial", "serial", lambda: refused(open_arm, DeviceAddress("/dev/ttyUSB0", None))),
         ("serial", "serial", lambda: refused(driver_of, *arm)),
         ("DracoPy", "meshes", lambda: read(draco_glb(), Format.GLB)),
         ("networkx", "meshes", lambda: read(threemf(), Format.THREEMF)),

@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.real_arm.codec.replies import AxisStatus, FirmwareError
 from katana450.extensions.real_arm.codec.requests import (
     ArmRequest,
@@ -27,7 +28,7 @@ from katana450.extensions.real_arm.codec.requests import (
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware
 from katana450.extensions.real_arm.emulator.server import IDLE, EmulatorServer
-from katana450.extensions.real_arm.link import ArmLink, TcpTransport
+from katana450.extensions.real_arm.link import ArmLink, open_arm
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -167,7 +168,7 @@ def emulator_process(*options: str) -> Iterator[tuple[subprocess.Popen[str], int
 @contextmanager
 def linked(port: int) -> Iterator[ArmLink]:
     """Connect to an arm behind a port."""
-    link = ArmLink(TcpTransport("127.0.0.1", port))
+    link = ArmLink(open_arm(DeviceAddress("127.0.0.1", port)))
     try:
         yield link
     finally:

@@ -65,11 +65,14 @@ def test_probe_without_an_arm_says_so_and_keeps_what_it_has(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--arm", "192.168.1.1"), "is not the address of an arm"),
-        (("--arm-log", "exchanges.log"), "needs an arm"),
-        (("--arm", "tcp://127.0.0.1", "--arm-log", "/nowhere/exchanges.log"), "cannot be written"),
+        (("--device", "192.168.1.1"), "is not the address of a device"),
+        (("--arm-log", "exchanges.log"), "needs a real arm"),
         (
-            ("--arm", "tcp://127.0.0.1", "--urdf", "tests/exchange/gantry.urdf"),
+            ("--device", "tcp://127.0.0.1", "--arm-log", "/nowhere/exchanges.log"),
+            "cannot be written",
+        ),
+        (
+            ("--device", "tcp://127.0.0.1", "--urdf", "tests/exchange/gantry.urdf"),
             "only by turning axes",
         ),
     ],

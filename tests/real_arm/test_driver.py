@@ -12,12 +12,12 @@ import pytest
 
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.errors import InputError
+from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.real_arm.codec import requests
 from katana450.extensions.real_arm.codec.codecs import reply_bytes
 from katana450.extensions.real_arm.codec.replies import FirmwareError, RefusedReply
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.driver.machine import ArmMachine
-from katana450.extensions.real_arm.link import ArmUrl
 from tests.real_arm.control_loop import SmallLoop, swing
 from tests.real_arm.paper_arm import ENDS, JOINTS, PaperArm
 from tests.real_arm.small_firmware import Piece, SmallFirmware
@@ -49,7 +49,7 @@ class PaperServer:
 def served() -> Iterator[tuple[PaperServer, SmallFirmware, SmallLoop]]:
     paper = PaperServer()
     with SmallFirmware(paper.answer) as firmware:
-        loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", firmware.port), ENDS, JOINTS))
+        loop = SmallLoop(KatanaDriver(DeviceAddress("127.0.0.1", firmware.port), ENDS, JOINTS))
         try:
             yield paper, firmware, loop
         finally:
@@ -126,7 +126,7 @@ def test_thread_that_hangs_is_reported_by_send(monkeypatch: pytest.MonkeyPatch) 
 def test_no_arm_at_the_address_is_reported_until_a_person_connects_again() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-    loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", port), ENDS, JOINTS))
+    loop = SmallLoop(KatanaDriver(DeviceAddress("127.0.0.1", port), ENDS, JOINTS))
     try:
         loop.driver.perform(ArmAct.CONNECT, 0.0)
         time.sleep(0.3)
@@ -173,7 +173,7 @@ def test_internal_error_is_a_loss_and_does_not_end_the_thread(
 
 
 def test_setpoint_that_is_not_finite_is_refused() -> None:
-    driver = KatanaDriver(ArmUrl("127.0.0.1", 1), ENDS, JOINTS)
+    driver = KatanaDriver(DeviceAddress("127.0.0.1", 1), ENDS, JOINTS)
     with pytest.raises(InputError, match="must be finite"):
         driver.send(np.full(5, np.nan), 0.0, 0.0)
     driver.stop()

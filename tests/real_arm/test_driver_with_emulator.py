@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode
+from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.real_arm.codec import requests
 from katana450.extensions.real_arm.driver.katana_driver import MAX_SILENCE, KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware
-from katana450.extensions.real_arm.link import ArmUrl
 from tests.conftest import LONG
 from tests.real_arm.control_loop import SmallLoop, swing
 from tests.real_arm.emulated import FaultyServer
@@ -66,7 +66,7 @@ def emulated() -> Iterator[tuple[SmallLoop, FaultyServer]]:
     arm = EmulatedArm(calibrated=True)
     server = FaultyServer(arm)
     server.start()
-    loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))
+    loop = SmallLoop(KatanaDriver(DeviceAddress("127.0.0.1", server.port), ENDS, JOINTS))
     try:
         yield loop, server
     finally:

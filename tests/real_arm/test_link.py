@@ -11,13 +11,20 @@ from contextlib import contextmanager
 import pytest
 
 from katana450.errors import InputError
+from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.real_arm.codec import replies, requests
 from katana450.extensions.real_arm.codec.codecs import (
     FirmwareCodec,
     reply_bytes,
     with_crc,
 )
-from katana450.extensions.real_arm.link import ArmLink, ArmRefusalError, ArmUrl, LinkLostError
+from katana450.extensions.real_arm.link import (
+    PORT,
+    ArmLink,
+    ArmRefusalError,
+    LinkLostError,
+    open_arm,
+)
 from tests.real_arm.small_firmware import Piece, SmallFirmware
 
 POSITIONS = replies.AxisPositions((1, -2, 3, -4, 5, -6))
@@ -33,7 +40,7 @@ def link_to(*pieces: Piece) -> Iterator[tuple[ArmLink, SmallFirmware]]:
         return (reply_bytes(ERROR),) if isinstance(request, requests.ErrorQuery) else pieces
 
     with SmallFirmware(answer) as firmware:
-        link = ArmLink(ArmUrl("127.0.0.1", firmware.port).open())
+        link = ArmLink(open_arm(DeviceAddress("127.0.0.1", firmware.port)))
         try:
             yield link, firmware
         finally:
@@ -101,16 +108,18 @@ def test_bytes_without_a_request_are_found_before_the_next_one_is_sent() -> None
 @pytest.mark.parametrize(
     ("text", "url"),
     [
-        ("tcp://192.168.1.1", ArmUrl("192.168.1.1", 5566)),
-        ("tcp://katana:99", ArmUrl("katana", 99)),
-        ("tcp://[::1]:99", ArmUrl("::1", 99)),
-        ("serial:///dev/ttyUSB0", ArmUrl("/dev/ttyUSB0", None)),
-        ("serial://COM3", ArmUrl("COM3", None)),
+        ("tcp://192.168.1.1", DeviceAddress("192.168.1.1", 5566)),
+        ("tcp://katana:99", DeviceAddress("katana", 99)),
+        ("tcp://[::1]:99", DeviceAddress("::1", 99)),
+        ("serial:///dev/ttyUSB0", DeviceAddress("/dev/ttyUSB0", None)),
+        ("serial://COM3", DeviceAddress("COM3", None)),
+        ("/dev/ttyACM0", DeviceAddress("/dev/ttyACM0", None)),
+        ("COM12", DeviceAddress("COM12", None)),
     ],
 )
-def test_address_is_read_and_shown(text: str, url: ArmUrl) -> None:
-    assert ArmUrl.parse(text) == url
-    assert ArmUrl.parse(str(url)) == url
+def test_address_is_read_and_shown(text: str, url: DeviceAddress) -> None:
+    assert DeviceAddress.parse(text, PORT) == url
+    assert DeviceAddress.parse(str(url), PORT) == url
 
 
 @pytest.mark.parametrize(
@@ -118,8 +127,8 @@ def test_address_is_read_and_shown(text: str, url: ArmUrl) -> None:
     ["", "192.168.1.1", "tcp://", "tcp://a:b", "tcp://a:0", "udp://a", "tcp://a/b", "serial://"],
 )
 def test_other_address_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="not the address of an arm"):
-        ArmUrl.parse(text)
+    with pytest.raises(InputError, match="not the address of a device"):
+        DeviceAddress.parse(text, PORT)
 
 
 def test_serial_device_is_used_like_a_socket() -> None:
@@ -140,7 +149,7 @@ def test_serial_device_is_used_like_a_socket() -> None:
                     os.write(master, REPLY[5:])
 
     threading.Thread(target=serve, daemon=True).start()
-    link = ArmLink(ArmUrl(os.ttyname(slave), None).open())
+    link = ArmLink(open_arm(DeviceAddress(os.ttyname(slave), None)))
     try:
         # Noise before a request is dropped.
         os.write(master, with_crc(b"z"))
@@ -156,13 +165,13 @@ def test_serial_device_is_used_like_a_socket() -> None:
 
 def test_serial_device_that_does_not_exist_is_reported() -> None:
     with pytest.raises(LinkLostError, match="cannot be opened"):
-        ArmUrl("/dev/no-such-device", None).open()
+        open_arm(DeviceAddress("/dev/no-such-device", None))
 
 
 def test_unplugged_serial_device_is_reported() -> None:
     pty = pytest.importorskip("pty")
     master, slave = pty.openpty()
-    port = ArmUrl(os.ttyname(slave), None).open()
+    port = open_arm(DeviceAddress(os.ttyname(slave), None))
     os.close(slave)
     os.close(master)
     with pytest.raises(LinkLostError, match="connection to the arm is lost"):

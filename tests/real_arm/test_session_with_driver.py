@@ -13,17 +13,18 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.arm.control.state.state import Reason, State
+from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.assembly.robot_session import describe_robot
+from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm, joints_at
-from katana450.extensions.real_arm.link import ArmUrl
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.real_arm.emulated import FaultyServer
@@ -33,7 +34,7 @@ from tests.real_arm.paper_arm import ENDS, JOINTS
 class Operator:
     """A person at the loop: gives commands and looks at the state."""
 
-    def __init__(self, session: Session, driver: KatanaDriver) -> None:
+    def __init__(self, session: Session, driver: Driver) -> None:
         self._mailbox = Mailbox(session.check)
         self.loop = ControlLoop(session, driver, self._mailbox, MonotonicClock(), 100.0)
 
@@ -77,7 +78,9 @@ def operator(request: pytest.FixtureRequest) -> Iterator[Operator]:
     server = FaultyServer(arm, delay)
     server.start()
     session = describe_robot(Settings(), URDF_PATH, None).session
-    operator = Operator(session, KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))
+    operator = Operator(
+        session, KatanaDriver(DeviceAddress("127.0.0.1", server.port), ENDS, JOINTS)
+    )
     operator.loop.start()
     yield operator
     operator.loop.stop()

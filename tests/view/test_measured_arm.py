@@ -75,7 +75,7 @@ def test_arm_is_drawn_where_it_is_measured_and_its_setpoint_as_a_ghost(
 
 
 def layer(arm: str | None) -> ViewLayer | None:
-    return view_layer(Namespace(arm=arm))
+    return view_layer(Namespace(device=arm))
 
 
 def test_simulated_arm_has_no_such_layer() -> None:

@@ -74,7 +74,7 @@ def add_arm_options(
             "--arm",
             type=_name,
             metavar="NAME",
-            help="a robot of the gallery; `katana450 arms` lists them",
+            help="the robot: one of the gallery, which `katana450 arms` lists (default: katana450)",
         )
     parser.add_argument(
         "--urdf",
@@ -107,9 +107,9 @@ def _assignment(text: str) -> tuple[str, str]:
 
 def _name(text: str) -> str:
     """Return the name of a robot. Raises ArgumentTypeError for an address or a file."""
-    if "." in text or ":" in text:
+    if any(sign in text for sign in ".:/\\"):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is an address or a file; this command takes the name of a robot, and a file "
-            "by --urdf"
+            f"{text!r} is an address or a file, not the name of a robot: give the address of a "
+            "real arm to `serve` by --device, and a file by --urdf"
         )
     return text

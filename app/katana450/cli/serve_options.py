@@ -83,5 +83,4 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-browser", action="store_true", help="do not open the page by itself")
     for add_options in provided("serve_options"):
         add_options(parser)
-    # The real arm adds an option of that name, which takes an address too.
-    add_arm_options(parser, names="--arm" not in parser.format_usage())
+    add_arm_options(parser)

@@ -235,6 +235,9 @@ def choose(options: Namespace, name: str) -> None:
     """Let ``options`` name the file of the robot ``name`` of the gallery. Raises KatanaError."""
     if options.urdf != URDF_PATH:
         raise ConfigurationError("--arm NAME and --urdf name two robots. Leave one of them out.")
+    if _plain(name) == "katana450":
+        options.arm = None
+        return
     robot = robot_named(name)
     options.urdf, options.arm = file_of(robot), None
     # Standard output is for the answers of the command.

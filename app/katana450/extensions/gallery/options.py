@@ -17,8 +17,7 @@ def add_arms_options(parser: ArgumentParser) -> None:
 def choose_named(options: Namespace) -> None:
     """Let ``options`` name the file of the robot that ``--arm`` names. Raises KatanaError."""
     name = getattr(options, "arm", None)
-    # No robot has a dot or a colon in its name: this is the address of a real arm.
-    if name is None or "." in name or ":" in name:
+    if name is None:
         return
     from katana450.extensions.gallery.arms_command import choose
 

@@ -14,7 +14,8 @@ from contextlib import suppress
 from katana450.assembly.log_output import printable
 from katana450.client.client import AsyncClient, aconnect
 from katana450.client.files import LostError, RefusedError
-from katana450.errors import InputError, KatanaError
+from katana450.errors import KatanaError
+from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.leader.follower import (
     Action,
     Ease,
@@ -26,22 +27,17 @@ from katana450.extensions.leader.follower import (
     Sample,
     Say,
 )
-from katana450.extensions.leader.joint_map import (
-    Calibration,
-    JointMap,
-    LeaderPosture,
-    read_calibration,
-)
-from katana450.extensions.leader.motor_bus import (
-    BAUD,
-    HOMING_OFFSET,
-    PRESENT_POSITION,
-    TORQUE_ENABLE,
+from katana450.extensions.leader.joint_map import JointMap, LeaderPosture
+from katana450.extensions.motor_bus.bus import (
+    PORT,
+    BusLostError,
     MotorBus,
-    SilentLeaderError,
-    UnpluggedError,
+    SilentMotorError,
+    check_calibration,
+    open_port,
 )
-from katana450.extensions.serial_port import SerialPort
+from katana450.extensions.motor_bus.calibration import Calibration, read_calibration
+from katana450.extensions.motor_bus.packets import PRESENT_POSITION, TORQUE_ENABLE
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.sdk import answers, requests
 from katana450.sdk import program_requests as programs
@@ -91,7 +87,7 @@ HELP = "Enter begins and ends following, Ctrl-C ends the program."
 def lead(options: Namespace) -> int:
     """Run ``katana450 leader`` and return the exit status. Raises KatanaError."""
     calibration = read_calibration(options.calibration)
-    port = SerialPort(options.port, BAUD, "the leader", UnpluggedError)
+    port = open_port(DeviceAddress.parse(options.port, PORT), "the leader")
     try:
         bus = MotorBus(port)
 
@@ -112,21 +108,15 @@ def lead(options: Namespace) -> int:
 def prepare(bus: MotorBus, calibration: Calibration, motors: tuple[int, ...]) -> None:
     """Switch the torque of ``motors`` off, so that a hand can move them.
 
-    Raises SilentLeaderError if one does not answer, and InputError if the calibration is not that
+    Raises SilentMotorError if one does not answer, and InputError if the calibration is not that
     of this leader. Nothing that the motors keep without power is written.
     """
     names = {motor.id: name for name, motor in calibration.items()}
     for motor in motors:
-        offset, expected = bus.read(motor, HOMING_OFFSET), calibration[names[motor]].homing_offset
-        if offset != expected:
-            raise InputError(
-                f"The homing offset of {names[motor]} is {offset} in the motor and {expected} in "
-                "the calibration file. The file is that of another leader, or the leader was "
-                "calibrated again. Choose its newest file."
-            )
+        check_calibration(bus, names[motor], calibration[names[motor]])
         bus.write(motor, TORQUE_ENABLE, 0)
         if errors := bus.errors(motor):
-            print(printable(f"{names[motor]} reports: {str(errors.name).lower()}."))
+            print(printable(f"{names[motor]} reports: {errors.words}."))
 
 
 class LeaderRun:
@@ -150,7 +140,7 @@ class LeaderRun:
         watching = asyncio.create_task(self._watch())
         try:
             return await self._drive(watching)
-        except (LostError, UnpluggedError) as error:
+        except (LostError, BusLostError) as error:
             raise type(error)(f"{error} The arm comes to rest by itself.") from error
         finally:
             await self._come_to_rest()
@@ -180,10 +170,10 @@ class LeaderRun:
             await asyncio.sleep(due - time.monotonic())
 
     def _posture(self) -> LeaderPosture | None:
-        """Return the posture of the leader; None if it does not answer. Raises UnpluggedError."""
+        """Return the posture of the leader; None if it does not answer. Raises BusLostError."""
         try:
             return self._joints.posture(self._bus.read_all(self._joints.motors, PRESENT_POSITION))
-        except SilentLeaderError:
+        except SilentMotorError:
             return None
 
     async def _watch(self) -> None:

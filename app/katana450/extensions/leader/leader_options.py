@@ -10,7 +10,9 @@ from katana450.cli.option_values import add_server_options
 
 def add_leader_options(parser: argparse.ArgumentParser) -> None:
     """Add port, calibration, and the address and token of the server, to ``parser``."""
-    parser.add_argument("port", help="serial port of the leader, such as /dev/ttyUSB0 or COM3")
+    parser.add_argument(
+        "port", help="serial port of the leader, such as /dev/ttyUSB0 or COM3, or tcp://HOST:PORT"
+    )
     parser.add_argument(
         "--calibration",
         type=Path,

@@ -128,5 +128,5 @@ class EncoderMap:
         if lower.shape != (5,) or np.abs(ends - [lower, upper]).max() > LIMIT_TOLERANCE:
             raise ConfigurationError(
                 "The robot description is not that of a Katana450 6M180: its joint limits differ. "
-                "Use the description of this arm, or no --arm."
+                "Use the description of this arm, or no --device."
             )

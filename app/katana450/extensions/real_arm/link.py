@@ -1,24 +1,19 @@
-"""Connections to an arm by TCP or a serial port, and exchanges, each within a deadline."""
+"""Connections to a Katana450, and exchanges with it, each within a deadline."""
 
 from __future__ import annotations
 
 import logging
-import socket
 import time
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
-from typing import Protocol
-from urllib.parse import urlsplit
 
-from katana450.errors import ConfigurationError, InputError, KatanaError
+from katana450.errors import ConfigurationError, KatanaError
+from katana450.extensions.device_address import DeviceAddress, Port
 from katana450.extensions.real_arm.codec.codecs import HostCodec, OutOfStepError
 from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError, RefusedReply
 from katana450.extensions.real_arm.codec.requests import ArmRequest, ErrorQuery
-from katana450.extensions.serial_port import SerialPort
 
 
 class LinkLostError(KatanaError):
@@ -37,138 +32,16 @@ class ArmRefusalError(KatanaError):
         self.error = error
 
 
-class Transport(Protocol):
-    """A connection that carries bytes. Its methods raise LinkLostError."""
-
-    def write(self, data: bytes, timeout: float) -> None:
-        """Send all of ``data`` at once within ``timeout`` [s]."""
-        ...
-
-    def read(self, timeout: float) -> bytes:
-        """Return what has arrived, or nothing if that takes longer than ``timeout`` [s]."""
-        ...
-
-    def close(self) -> None:
-        """End the connection. May be called twice."""
-        ...
-
-
 PORT = 5566
 """TCP port of every arm."""
-
-RECEIVED_BYTES = 4096
-
-QUICK_ACK: int | None = getattr(socket, "TCP_QUICKACK", None)
-"""Option of Linux that acknowledges at once: an acknowledgement held back for 40 ms may be the 40
-ms of a reply that drivers of real arms report."""
-
-
-class TcpTransport:
-    """A TCP connection. Each request is one write, and small segments are not held back."""
-
-    def __init__(self, host: str, port: int = PORT, timeout: float = 1.0) -> None:
-        """Connect within ``timeout`` [s]. Raises LinkLostError."""
-        try:
-            self._socket = socket.create_connection((host, port), timeout)
-        except (OSError, UnicodeError) as error:
-            raise LinkLostError(
-                f"There is no connection to an arm at {host}, port {port}: {_reason(error)}."
-            ) from None
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-
-    def write(self, data: bytes, timeout: float) -> None:
-        """Send ``data`` in one write. Raises LinkLostError, also if bytes wait to be read."""
-        try:
-            self._socket.setblocking(False)
-            with suppress(BlockingIOError):
-                unread = self._socket.recv(RECEIVED_BYTES)
-                raise LinkLostError(
-                    f"The arm sent bytes without a request ({unread[:8].hex(' ')})."
-                    if unread
-                    else "The arm closed the connection."
-                )
-            self._socket.settimeout(timeout)
-            self._socket.sendall(data)
-        except OSError as error:
-            raise LinkLostError(f"The connection to the arm broke: {_reason(error)}.") from None
-
-    def read(self, timeout: float) -> bytes:
-        """Return what has arrived; nothing after ``timeout`` [s]. Raises LinkLostError."""
-        try:
-            self._socket.settimeout(timeout)
-            if QUICK_ACK is not None:
-                # The system clears this option by itself.
-                self._socket.setsockopt(socket.IPPROTO_TCP, QUICK_ACK, 1)
-            data = self._socket.recv(RECEIVED_BYTES)
-        except TimeoutError:
-            return b""
-        except OSError as error:
-            raise LinkLostError(f"The connection to the arm broke: {_reason(error)}.") from None
-        if not data:
-            raise LinkLostError("The arm closed the connection.")
-        return data
-
-    def close(self) -> None:
-        """End the connection."""
-        self._socket.close()
-
-
-def _reason(error: Exception) -> str:
-    return (getattr(error, "strerror", None) or str(error) or type(error).__name__).lower()
-
 
 BAUD = 57_600
 """[bit/s] Rate of every arm with a serial port."""
 
 
-CONNECT_TIMEOUT = 1.0
-"""[s] Longest time that an attempt to connect may take."""
-
-
-@dataclass(frozen=True)
-class ArmUrl:
-    """Address of an arm.
-
-    Attributes:
-        host: Name or IP address, or the path of a serial port.
-        port: TCP port; None for a serial port.
-    """
-
-    host: str
-    port: int | None = PORT
-
-    @classmethod
-    def parse(cls, text: str) -> ArmUrl:
-        """Return the address in ``text``: tcp://HOST[:PORT] or serial://PATH.
-
-        Raises InputError.
-        """
-        scheme, separator, rest = text.partition("://")
-        if scheme == "serial" and separator and rest:
-            return cls(rest, None)
-        try:
-            parts = urlsplit(text)
-            host, port = parts.hostname, parts.port
-        except ValueError:
-            host = port = None
-        if scheme != "tcp" or not host or port == 0 or text.count("/") > 2:
-            raise InputError(
-                f"{text!r} is not the address of an arm: give tcp://HOST, tcp://HOST:PORT, or "
-                "serial://PATH such as serial:///dev/ttyUSB0."
-            )
-        return cls(host, PORT if port is None else port)
-
-    def open(self) -> Transport:
-        """Connect, and return the connection. Raises LinkLostError and ConfigurationError."""
-        if self.port is None:
-            return SerialPort(self.host, BAUD, "the arm", LinkLostError)
-        return TcpTransport(self.host, self.port, CONNECT_TIMEOUT)
-
-    def __str__(self) -> str:
-        if self.port is None:
-            return f"serial://{self.host}"
-        host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"tcp://{host}:{self.port}"
+def open_arm(address: DeviceAddress) -> Port:
+    """Connect to the arm at ``address``. Raises LinkLostError and ConfigurationError."""
+    return address.open(BAUD, "the arm", LinkLostError)
 
 
 MAX_LOG_BYTES = 32_000_000
@@ -220,7 +93,7 @@ class ArmLink:
 
     def __init__(
         self,
-        transport: Transport,
+        transport: Port,
         clock: Callable[[], float] = time.perf_counter,
         log: ExchangeLog | None = None,
     ) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from katana450.cli.option_values import number, port
 from katana450.errors import ConfigurationError
+from katana450.extensions.real_arm.link import PORT
 from katana450.extensions.real_arm.plant.axis import PROFILES
 
 if TYPE_CHECKING:
@@ -20,15 +21,12 @@ if TYPE_CHECKING:
     from katana450.maths.geometry.arrays import FloatArray
     from katana450.sdk import ViewLayer
 
-PORT = 5566
-"""TCP port of an arm."""
-
 STOP_BUTTON = (
     "No program is a safety device: a hardware stop button that cuts the power of the arm stays "
     "necessary, within reach of the person beside it."
 )
 
-ADDRESS_HELP = "address of the arm: tcp://HOST, tcp://HOST:PORT or serial:///dev/ttyUSB0"
+ADDRESS_HELP = "address of the arm: tcp://HOST, tcp://HOST:PORT, or a serial port as /dev/ttyUSB0"
 
 WIDEST_OBJECT = 120.0
 """[mm] Gap of the open gripper."""
@@ -80,10 +78,9 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 serve`` to ``parser``."""
     driven = parser.add_mutually_exclusive_group()
     driven.add_argument(
-        "--arm",
-        metavar="URL|NAME",
-        help=f"drive a real arm. {ADDRESS_HELP[0].upper()}{ADDRESS_HELP[1:]}. {STOP_BUTTON} A name "
-        "is a simulated robot of the gallery instead; `katana450 arms` lists them",
+        "--device",
+        metavar="ADDRESS",
+        help=f"drive a real arm. {ADDRESS_HELP[0].upper()}{ADDRESS_HELP[1:]}. {STOP_BUTTON}",
     )
     driven.add_argument(
         "--plant",
@@ -92,7 +89,7 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         "arm)",
     )
     parser.add_argument(
-        "--arm-log", type=Path, metavar="FILE", help="write all exchanges with the real arm there"
+        "--arm-log", type=Path, metavar="FILE", help="write all exchanges with a Katana450 there"
     )
 
 
@@ -101,12 +98,12 @@ def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> D
 
     q: (n,) [rad] and gripper [rad] are reported before the first measurement. Raises KatanaError.
     """
-    if options.arm is not None:
+    if options.device is not None:
         from katana450.extensions.real_arm.driver.katana_driver import driver_of
 
         return driver_of(options, robot, q, gripper)
     if options.arm_log is not None:
-        raise ConfigurationError("--arm-log needs an arm: add --arm URL.")
+        raise ConfigurationError("--arm-log needs a real arm: add --device ADDRESS.")
     if options.plant is None:
         return None
     from katana450.extensions.real_arm.plant.driver import PlantDriver
@@ -116,7 +113,7 @@ def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> D
 
 def view_layer(options: Namespace) -> ViewLayer | None:
     """Return the layer of a real arm whose posture may be unknown; None for a simulated one."""
-    if options.arm is None:
+    if options.device is None:
         return None
     from katana450.extensions.real_arm.unknown_posture import UnknownPosture
 

@@ -15,10 +15,17 @@ import msgspec
 from katana450.assembly.log_output import printable
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.cli.version import version
+from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.real_arm.codec import requests as req
 from katana450.extensions.real_arm.codec.codecs import request_bytes
 from katana450.extensions.real_arm.codec.replies import AXES, ArmReply
-from katana450.extensions.real_arm.link import ArmLink, ArmRefusalError, ArmUrl, LinkLostError
+from katana450.extensions.real_arm.link import (
+    PORT,
+    ArmLink,
+    ArmRefusalError,
+    LinkLostError,
+    open_arm,
+)
 
 TIMEOUT = 2.0
 """[s] Longest time for which the probe waits for a reply: an unknown arm may be slow."""
@@ -42,7 +49,7 @@ Report = dict[str, Any]
 
 def probe(options: Namespace) -> int:
     """Run ``katana450 arm probe``; return the exit status: 1 if the arm stopped answering."""
-    url = ArmUrl.parse(options.url)
+    url = DeviceAddress.parse(options.url, PORT)
     path: Path = options.out or Path(time.strftime("arm-probe-%Y%m%d-%H%M%S.json"))
     check_writable(path)
     readings: Report = {}
@@ -54,7 +61,7 @@ def probe(options: Namespace) -> int:
         "readings": readings,
     }
     try:
-        read_arm(ArmLink(url.open()), readings)
+        read_arm(ArmLink(open_arm(url)), readings)
     except LinkLostError as error:
         report["lost"] = str(error)
     write_files({path: writer_of((json.dumps(report, indent=2) + "\n").encode())})

@@ -94,7 +94,7 @@ class RobotChoice(RequestHandler):
 
     def _check(self, participant: Participant) -> None:
         """Raise LeaseError or InputError if ``participant`` may not change the robot now."""
-        if self.hub.replace_robot is None or getattr(self._options, "arm", None):
+        if self.hub.replace_robot is None or getattr(self._options, "device", None):
             raise InputError("This server drives a real arm, so its robot cannot be changed.")
         if self.hub.runner.running:
             raise LeaseError("A program runs. Wait until it ends.")

@@ -17,15 +17,17 @@ from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, KatanaError
+from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.real_arm.codec.requests import ArmRequest
 from katana450.extensions.real_arm.driver.machine import ArmMachine
 from katana450.extensions.real_arm.encoder_map import EncoderMap
 from katana450.extensions.real_arm.link import (
+    PORT,
     ArmLink,
     ArmRefusalError,
-    ArmUrl,
     ExchangeLog,
     LinkLostError,
+    open_arm,
 )
 from katana450.extensions.real_arm.tool_travel import Travel, tool_travel
 from katana450.extras import require
@@ -69,7 +71,7 @@ class KatanaDriver:
 
     def __init__(
         self,
-        url: ArmUrl,
+        url: DeviceAddress,
         bounds: FloatArray,
         joints: FloatArray,
         travel: Travel | None = None,
@@ -220,7 +222,7 @@ class KatanaDriver:
             self._sleep()
             return
         try:
-            self._link = ArmLink(self._url.open(), self._clock, self._exchange_log)
+            self._link = ArmLink(open_arm(self._url), self._clock, self._exchange_log)
         except KatanaError as error:
             self._lose(str(error))
         else:
@@ -272,13 +274,13 @@ class KatanaDriver:
 
 
 def driver_of(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> KatanaDriver:
-    """Return the driver of the arm at ``options.arm``, without a connection.
+    """Return the driver of the arm at ``options.device``, without a connection.
 
     q: (n,) [rad] and gripper [rad] are reported before the first measurement. Raises KatanaError
     for a wrong address, a missing extra, a log that cannot be written, and a robot that is not this
     arm.
     """
-    url = ArmUrl.parse(options.arm)
+    url = DeviceAddress.parse(options.device, PORT)
     if url.port is None:
         # Before the server starts: the driver tries to connect until it is ended.
         require("serial", "serial", "Serial ports")

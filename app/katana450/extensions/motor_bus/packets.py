@@ -1,4 +1,4 @@
-"""The bus of Feetech STS3215 servos: packets, requests, and answers within a deadline.
+"""Packets and registers of Feetech STS3215 servos.
 
 A packet is ``FF FF id length code parameters checksum``. Its code is an instruction from the host,
 or the error flags of a motor. Source: the memory table and protocol of Feetech's STS series.
@@ -6,18 +6,15 @@ or the error flags of a motor. Source: the memory table and protocol of Feetech'
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from typing import NamedTuple, Protocol
-
-from katana450.errors import KatanaError
+from typing import NamedTuple
 
 HEADER = b"\xff\xff"
 
 BROADCAST = 0xFE
-"""Id to which a sync read is addressed."""
+"""Id to which a request to several motors is addressed."""
 
 MAX_ID = 0xFD
 """Highest id of a motor."""
@@ -40,7 +37,9 @@ class Instruction(IntEnum):
     READ = 0x02
     WRITE = 0x03
     SYNC_READ = 0x82
-    """Read the same register of several motors, which answer one after the other."""
+    """Read the same registers of several motors, which answer one after the other."""
+    SYNC_WRITE = 0x83
+    """Set the same register of several motors, which do not answer."""
 
 
 class MotorError(IntFlag):
@@ -51,6 +50,11 @@ class MotorError(IntFlag):
     OVERHEAT = 0x04
     OVERCURRENT = 0x08
     OVERLOAD = 0x20
+
+    @property
+    def words(self) -> str:
+        """The errors in words, such as "overheat, overload"; empty without one."""
+        return ", ".join(flag.name.lower() for flag in MotorError if flag in self and flag.name)
 
 
 class Register(NamedTuple):
@@ -83,12 +87,32 @@ class Register(NamedTuple):
         return -(value & ((1 << self.sign_bit) - 1))
 
 
+MIN_POSITION, MAX_POSITION = Register(9, 2, 15), Register(11, 2, 15)
+"""[ticks] Range that a motor leaves for no goal. It keeps it without power."""
+
 HOMING_OFFSET = Register(31, 2, 11)
-"""Actual minus reported position [ticks]."""
+"""Actual minus reported position [ticks]. The motor keeps it without power."""
+
+OPERATING_MODE = Register(33, 1)
+"""0 for position control."""
 
 TORQUE_ENABLE = Register(40, 1)
+GOAL_POSITION = Register(42, 2, 15)
+"""[ticks]"""
+TORQUE_LIMIT = Register(48, 2)
+"""[1/1000 of the largest torque]"""
 PRESENT_POSITION = Register(56, 2, 15)
 """[ticks]"""
+PRESENT_SPEED = Register(58, 2, 15)
+"""[ticks/s]"""
+PRESENT_LOAD = Register(60, 2, 10)
+"""[1/1000 of the largest torque]"""
+PRESENT_VOLTAGE = Register(62, 1)
+"""[0.1 V]"""
+PRESENT_TEMPERATURE = Register(63, 1)
+"""[degrees C]"""
+PRESENT_CURRENT = Register(69, 2, 15)
+"""[6.5 mA]"""
 
 
 @dataclass(frozen=True)
@@ -133,10 +157,16 @@ def write_request(motor: int, register: Register, value: int) -> Packet:
     return Packet(motor, Instruction.WRITE, data)
 
 
-def sync_read_request(motors: tuple[int, ...], register: Register) -> Packet:
-    """Return the request for the value of ``register`` of all ``motors``."""
-    data = bytes((register.address, register.size, *motors))
-    return Packet(BROADCAST, Instruction.SYNC_READ, data)
+def sync_read_request(motors: tuple[int, ...], address: int, size: int) -> Packet:
+    """Return the request for ``size`` bytes from ``address`` on of all ``motors``."""
+    return Packet(BROADCAST, Instruction.SYNC_READ, bytes((address, size, *motors)))
+
+
+def sync_write_request(register: Register, values: Mapping[int, int]) -> Packet:
+    """Return the request that sets ``register`` to the ``values`` by the ids of the motors."""
+    rows = (bytes((motor,)) + register.encoded(value) for motor, value in values.items())
+    head = bytes((register.address, register.size))
+    return Packet(BROADCAST, Instruction.SYNC_WRITE, head + b"".join(rows))
 
 
 class PacketReader:
@@ -169,96 +199,3 @@ class PacketReader:
         # The last byte may be the first half of a header.
         del rest[: place if place >= 0 else max(len(rest) - 1, 0)]
         return packets
-
-
-BAUD = 1_000_000
-"""[bit/s] Rate of an STS3215 as delivered."""
-
-DEADLINE = 0.05
-"""[s] Timeout for the answers to a request. Adapters for USB hold bytes back for up to 16 ms."""
-
-READ_TIMEOUT, WRITE_TIMEOUT = 0.005, 1.0
-"""[s] Timeouts of one read, which may return a part of an answer, and of a request."""
-
-TRIES = 3
-"""Number of times that a request is sent before the motor counts as silent."""
-
-
-class SilentLeaderError(KatanaError):
-    """A motor of the leader does not answer."""
-
-
-class UnpluggedError(KatanaError):
-    """The serial port of the leader cannot be opened, or is lost."""
-
-
-class Port(Protocol):
-    """A serial port. Its methods raise UnpluggedError."""
-
-    def write(self, data: bytes, timeout: float) -> None:
-        """Send ``data`` within ``timeout`` [s], and drop the bytes that wait to be read."""
-
-    def read(self, timeout: float) -> bytes:
-        """Return the bytes that arrive, which may be none, within ``timeout`` [s]."""
-
-
-class MotorBus:
-    """The motors at one port, asked one request at a time."""
-
-    def __init__(self, port: Port) -> None:
-        self._port = port
-        self._reader = PacketReader()
-
-    def read(self, motor: int, register: Register) -> int:
-        """Return the value of ``register``. Raises SilentLeaderError after some tries."""
-        return register.decoded(self._answer(read_request(motor, register), register.size))
-
-    def write(self, motor: int, register: Register, value: int) -> None:
-        """Set ``register`` to ``value``. Raises SilentLeaderError after some tries."""
-        self._answer(write_request(motor, register, value), 0)
-
-    def errors(self, motor: int) -> MotorError:
-        """Return the errors that ``motor`` reports. Raises SilentLeaderError after some tries."""
-        for _ in range(TRIES):
-            packets = self._exchange(ping_request(motor), (motor,), 0)
-            if motor in packets:
-                return MotorError(packets[motor].code)
-        raise self._silent((motor,))
-
-    def read_all(self, motors: tuple[int, ...], register: Register) -> dict[int, int]:
-        """Return the value of ``register`` of all ``motors``.
-
-        Raises SilentLeaderError if one does not answer. The request is not repeated, because the
-        next one asks for newer values.
-        """
-        packets = self._exchange(sync_read_request(motors, register), motors, register.size)
-        if missing := [motor for motor in motors if motor not in packets]:
-            raise self._silent(missing)
-        return {motor: register.decoded(packets[motor].parameters) for motor in motors}
-
-    def _answer(self, request: Packet, size: int) -> bytes:
-        for _ in range(TRIES):
-            packets = self._exchange(request, (request.id,), size)
-            if request.id in packets:
-                return packets[request.id].parameters
-        raise self._silent((request.id,))
-
-    def _exchange(self, request: Packet, motors: tuple[int, ...], size: int) -> dict[int, Packet]:
-        """Send ``request``; return the answers of ``motors`` with ``size`` bytes, by their ids."""
-        self._reader.clear()
-        self._port.write(request.encoded, WRITE_TIMEOUT)
-        packets: dict[int, Packet] = {}
-        due = time.monotonic() + DEADLINE
-        while len(packets) < len(motors) and time.monotonic() < due:
-            for packet in self._reader.feed(self._port.read(READ_TIMEOUT)):
-                if packet.id in motors and len(packet.parameters) == size:
-                    packets[packet.id] = packet
-        return packets
-
-    @staticmethod
-    def _silent(motors: Iterable[int]) -> SilentLeaderError:
-        names = ", ".join(map(str, motors))
-        return SilentLeaderError(
-            f"Of the leader's motors, these do not answer: {names}. Check its power, its cables "
-            "and the ids in the calibration file."
-        )

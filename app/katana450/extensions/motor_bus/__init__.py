@@ -1,0 +1,1 @@
+"""The bus of Feetech servos: packets, exchanges within deadlines, calibration files of LeRobot."""
