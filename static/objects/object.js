@@ -135,8 +135,10 @@ export class ObjectForm {
     const added = before.length ? names.find((name) => !before.some((object) => object.name === name)) : undefined;
     if (names.join("\n") !== before.map(({ name }) => name).join("\n")) {
       const chosen = this.#name;
-      this.#choice.replaceChildren(...names.map((name) => new Option(name)));
-      this.#choice.value = added ?? (names.includes(chosen) ? chosen : names[0] ?? "");
+      this.#choice.replaceChildren(new Option("Choose an object", ""), ...names.map((name) => new Option(name)));
+      // None takes the place of one that is gone: its Remove would remove another.
+      this.#choice.value = added ?? (names.includes(chosen) || before.length ? chosen : names[0] ?? "");
+      if (this.#choice.selectedIndex < 0) this.#choice.value = "";
     }
     this.#show(this.#name !== before.find(({ name }) => name === this.#name)?.name);
   }
@@ -144,7 +146,8 @@ export class ObjectForm {
   // Show the chosen object; one that a person is changing only with `again`.
   #show(again = false) {
     const object = this.#object;
-    this.element.hidden = !object;
+    this.element.hidden = !this.#objects.length;
+    this.element.classList.toggle("none", !object);
     if (!object || (!again && (this.#sender || performance.now() - this.#acted < HELD || this.element.matches(":active")))) return;
     const { colour, opacity, size, scale, hidden, T, held, zone } = object;
     this.#colour.value = colour ?? PLAIN;

@@ -66,6 +66,8 @@ export class Editor {
 
   /** Show `problems`: {line, text} each. @param {Problem[]} problems */
   explain(problems) {
+    // What said that there are some is true no longer.
+    if (this.problems.length && !problems.length) this.#sheet.report("");
     this.problems = problems;
     const lines = new Set(problems.map(({ line }) => line));
     [...this.#numbers.children].forEach((row, i) => row.classList.toggle("bad", lines.has(i + 1)));

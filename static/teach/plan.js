@@ -6,6 +6,7 @@ import { request } from "../server.js";
 const EVERY = 300; // ms between two looks at the program
 const SEND_EVERY = 100; // ms between two times of the preview
 const HELD = 1000; // ms after the last press of a person for which the slider stays where they left it
+const WELL = ["running", "done"];
 const IN_USE = ["planning", "running", "paused", "blocked"];
 
 export class Plan {
@@ -60,6 +61,8 @@ export class Plan {
     const answer = await request("api/v1/program_plan").catch(() => null);
     if (!answer) return;
     this.answer = await answer.json();
+    // A program that was continued has overcome what had ended it.
+    if (this.isShown && WELL.includes(this.answer.program?.status ?? "")) this.#sheet.editor.explain([]);
     this.draw();
     this.#sheet.drawPlan();
   }

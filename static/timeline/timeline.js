@@ -136,7 +136,7 @@ export class Timeline {
     const [t, { revocations = 0 }] = [this.#t ?? 0, this.#page.store.status ?? {}];
     api.restore({ page: this.#page.name, of: this.#of, t, revocations }).then(() => {
       this.live();
-      this.#page.toast(`The arm continues from ${timeInWords(t)}.`);
+      this.#page.toast(`The arm continues from ${timeInWords(t)}. Objects, speed and tool are as they were then.`);
     }, (error) => this.#page.toast(messageOf(error)));
   }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 import viser
 
@@ -59,3 +60,24 @@ def test_a_position_beyond_the_limit_in_another_frame_can_be_edited(
     choose_frame(server, SHOULDER)
     assert position.value == pytest.approx((0.0, 0.0, 1000.0))
     assert guard.objection(internals.value_change(position, (0.0, 0.0, 1002.0))) is not None
+
+
+def test_numbers_are_the_goal_until_a_person_types(
+    server: viser.ViserServer, form: PoseForm, session: Session
+) -> None:
+    position, angles = control(server, "x, y, z"), control(server, "r, p, y")
+    states = [
+        session.begin(session.ready + turn * np.eye(5)[0], 0.0, 0.0) for turn in (0.0, 0.3, 0.6)
+    ]
+    shown = []
+    for state in states:
+        form.set_controls(state)
+        shown.append((position.value, angles.value))
+    assert len(set(shown)) == 3
+    position.value, angles.value = shown[0]
+    form.set_controls(states[1])
+    assert (position.value, angles.value) == shown[0]
+    # Once the arm goes where the numbers say, they are its goal again.
+    form.set_controls(states[0])
+    form.set_controls(states[2])
+    assert (position.value, angles.value) == shown[2]

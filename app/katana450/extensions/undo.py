@@ -153,7 +153,7 @@ def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | No
         case cmd.SetPriority():
             return "priority", cmd.SetPriority(state.priority)
         case cmd.RestoreState():
-            return "moment", cmd.RestoreState(state)
+            return "continuation", cmd.RestoreState(state)
     name = _object_of(command) if isinstance(command, OBJECTS) else None
     if name is None:
         return None

@@ -213,13 +213,15 @@ class Panel:
 class PoseForm:
     """The form of the tool pose: tool and priority, frame, and numbers to type.
 
-    The numbers stay until a person changes them or copies the present pose.
+    The numbers are the pose of the goal. What a person has typed stays until the goal is there, or
+    until they copy the present pose.
     """
 
     def __init__(self, gui: viser.GuiApi, arm: MountedArm, listen: Listen, state: State) -> None:
         """Add the controls to ``gui``. They show ``state`` first."""
         self._arm, self._priorities = arm, arm.kinematics.priorities
-        self._state = state
+        self._state, self._goal = state, (state.tool, state.goal)
+        self._filled: tuple[tuple[float, ...], ...] = ()
         self._tool = gui.add_dropdown(
             "Tool",
             tuple(arm.tools),
@@ -268,7 +270,13 @@ class PoseForm:
         self._state = state
 
     def set_controls(self, state: State) -> None:
-        """Show the tool and the priority of ``state``."""
+        """Show the tool, the priority and the goal of ``state``."""
+        goal = state.tool, state.goal
+        if not all(map(is_, goal, self._goal)):
+            self._goal = goal
+            T = forward(self._arm.chain_to(state.tool), state.goal)
+            if self._numbers in (self._filled, self._numbers_of(T)):
+                self._fill(T)
         set_value(self._tool, state.tool)
         set_value(self._priority, self._priorities[state.priority][0])
         meaning = self._hint(state.priority)
@@ -290,18 +298,30 @@ class PoseForm:
 
     async def _change_display(self, _: viser.GuiEvent[Any]) -> None:
         """Convert the numbers to the chosen frame."""
+        is_typed = self._numbers != self._filled
         T = self.display.pose(self._position.value, self._angles.value)
         self.display = self._chosen()
         self._fill(T)
+        if is_typed:
+            self._filled = ()
 
     async def _copy(self, event: viser.GuiEvent[Any]) -> None:
         if event.client_id is not None:
             state = self._state
             self._fill(forward(self._arm.chain_to(state.tool), state.q))
 
+    @property
+    def _numbers(self) -> tuple[tuple[float, ...], ...]:
+        """The position [mm] and the angles [deg] in the form."""
+        return tuple(self._position.value), tuple(self._angles.value)
+
+    def _numbers_of(self, T: FloatArray) -> tuple[tuple[float, ...], ...]:
+        """Return the numbers of the pose ``T`` (4, 4) in {S}."""
+        return tuple(map(_rounded, self.display.numbers(T)))
+
     def _fill(self, T: FloatArray) -> None:
         """Show the pose ``T`` (4, 4) in {S}."""
-        position, angles = map(_rounded, self.display.numbers(T))
+        self._filled = position, angles = self._numbers_of(T)
         # The page sends all three numbers when one is edited, so each must be allowed.
         end = max(MAX_TYPED_POSITION, *(abs(x) + STEP for x in position))
         self._position.min, self._position.max = (-end, -end, -end), (end, end, end)
