@@ -131,7 +131,7 @@ def test_no_arm_at_the_address_is_reported_until_a_person_connects_again() -> No
         loop.driver.perform(ArmAct.CONNECT, 0.0)
         time.sleep(0.3)
         assert loop.report.mode is ArmMode.DISCONNECTED
-        assert f"no connection to an arm at 127.0.0.1, port {port}" in loop.report.note
+        assert f"no connection to the arm at 127.0.0.1, port {port}" in loop.report.note
         paper = PaperServer()
         with SmallFirmware(paper.answer, port) as firmware:
             time.sleep(0.5)
