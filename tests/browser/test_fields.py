@@ -86,7 +86,6 @@ def test_value_is_sent_on_enter_or_by_leaving_and_only_in_its_range(
     assert watch.sees(50, 12.5, "Home")
 
 
-@pytest.mark.long
 def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Truth) -> None:
     box = page.number_box("1 base turn")
     home, watch = box.input_value(), Watch(page)
