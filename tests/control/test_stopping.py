@@ -20,7 +20,7 @@ from katana450.arm.control.session.stopping import (
     joined,
     restarted,
 )
-from katana450.arm.control.state.messages import finding_text
+from katana450.arm.control.state.messages import finding_text, sentence
 from katana450.arm.control.state.state import Finding, Reason, State, Status, Verdict
 from katana450.arm.control.state.stop_cause import WATCHDOG, StopCause, pressed
 from katana450.maths.kinematics.priority import Priority
@@ -228,3 +228,11 @@ def test_restarted_arm_is_stopped_with_the_scene_of_the_kept_state(
     cleared = ticked(session, later, cmd.ClearStop(), ticks=50)
     np.testing.assert_array_equal(cleared.q, moving.q)
     assert restarted(beginning, None).stopped is not None
+
+
+def test_sentence_names_one_way_out_of_two_pauses(session: Session, state: State) -> None:
+    moving = ticked(session, state, cmd.Joint(1, 2.0), ticks=20)
+    paused = ticked(session, moving, cmd.Pause(), cmd.HoldFor(LATE))
+    assert {Reason.PAUSED, Reason.WAITING} <= reasons(paused)
+    assert "press Resume" in sentence(paused)
+    assert "next command" not in sentence(paused)

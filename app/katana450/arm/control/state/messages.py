@@ -265,10 +265,10 @@ def sentence(state: State) -> str:
     """
     if not state.findings:
         return ""
-    now = [_reason(state, finding) for finding in state.findings if finding.reason in ABOUT_NOW]
-    goal = [
-        _reason(state, finding) for finding in state.findings if finding.reason not in ABOUT_NOW
-    ]
+    # A pause by a person lasts, also if the server has paused the arm besides.
+    findings = [f for f in state.findings if not (state.paused and f.reason is Reason.WAITING)]
+    now = [_reason(state, finding) for finding in findings if finding.reason in ABOUT_NOW]
+    goal = [_reason(state, finding) for finding in findings if finding.reason not in ABOUT_NOW]
     if goal and state.moving:
         goal[0] = f"at the goal: {goal[0]}"
     return _capital("; ".join((*now, *goal))) + "."
