@@ -172,12 +172,12 @@ def test_partly_refused_batch_names_the_refused_parts(session: Session) -> None:
     answer = done(serialize.concluded(answers.Done(ticket=1), *state.outcomes))
     assert (answer.outcome, reasons(answer)) == ("limited", ["axis limit"])
     (part,) = answer.refused
-    assert (part.part, part.command, part.why) == (2, "move_object", "There is no 'ball'.")
+    assert (part.part, part.command, part.why) == (2, "move_object", "There is no object 'ball'.")
     other = cmd.MoveObject("cube", position=np.zeros(3))
     state = session.step(state, [cmd.Batch((missing, other))], 0.02)
     refused = serialize.concluded(answers.Done(ticket=2), *state.outcomes)
     assert isinstance(refused, answers.Refused)
-    assert refused.why == "There is no 'ball'. There is no 'cube'."
+    assert refused.why == "There is no object 'ball'. There is no object 'cube'."
 
 
 def test_every_channel_reports_the_outcome(local: VirtualServer) -> None:
@@ -188,7 +188,7 @@ def test_every_channel_reports_the_outcome(local: VirtualServer) -> None:
         # Without an id only a refusal is sent.
         rows.say(do="joint", axis=1, value=0.0)
         rows.say(do="remove", name="nothing")
-        assert "There is no 'nothing'." in rows.hear()["why"]
+        assert "There is no object 'nothing'." in rows.hear()["why"]
         rows.answer(do="release_lease")
     status, answer = local.post(do="joint", axis=1, value=9.0)
     assert (status, answer["outcome"]) == (200, "limited")

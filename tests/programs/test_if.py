@@ -72,7 +72,7 @@ def test_steps_are_repeated_until_a_condition_holds(stage: Stage, empty: State) 
         assert turned(empty, states[-1], 5) == pytest.approx(10.0 * rounds, abs=1e-6)
         took = states[-1].t - empty.t
         assert program.duration == pytest.approx(took, abs=0.03 * len(program.tasks))
-    for until, why in (("{}", "An until needs exactly one of"), ("{held: 1}", "Expected a text")):
+    for until, why in (("{}", "`until` needs exactly one of"), ("{held: 1}", "Expected a text")):
         with pytest.raises(ScriptError, match=why):
             parse(f"steps:\n  - repeat: {{times: 2, until: {until}, steps: [home]}}\n")
 
@@ -269,9 +269,9 @@ def test_impossible_step_of_an_alternative_is_refused(stage: Stage, empty: State
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        ("{then: [home]}", "An if needs exactly one of held, volume\\."),
+        ("{then: [home]}", "`if` needs exactly one of held, volume\\."),
         ("{held: cup, volume: {of: cup, at_least: 1}, then: [home]}", "exactly one of"),
-        ("{held: cup}", "An if needs 'then'"),
+        ("{held: cup}", "`if` needs 'then'"),
         ("{held: cup, then: []}", "Expected a list of steps"),
         ("{held: cup, then: [home], else: []}", "Expected a list of steps"),
         ("{held: cup, then: [home], otherwise: [home]}", "has no 'otherwise'"),

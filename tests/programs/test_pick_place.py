@@ -128,11 +128,11 @@ def holding(stage: Stage) -> State:
 @pytest.mark.parametrize(
     ("steps", "message"),
     [
-        ("- pick: box\n", "no object 'box'. Known objects: part, low, far"),
+        ("- pick: box\n", "no object 'box'. Known objects: 'part', 'low', 'far'"),
         ("- pick: low\n", "low is 10.0 mm high, and the minimum is 12 mm"),
         ("- pick: far\n", r"far cannot be grasped at its place: The tool grasp cannot be at"),
-        ("- place: {at: {x: 230, y: -120}}\n", "The hand holds nothing to place. `pick` an object"),
-        ("- release\n", "The hand holds nothing to release"),
+        ("- place: {at: {x: 230, y: -120}}\n", "The hand holds nothing to `place`. `pick` an"),
+        ("- release\n", "The hand holds nothing to `release`"),
         ("- pick: {object: part, side: front}\n", "its sides are turned too far, seen from"),
         # The pitch of the grasp has nothing to do with it.
         (
@@ -264,13 +264,13 @@ def test_object_held_from_the_front_is_not_turned(stage: Stage) -> None:
 @pytest.mark.parametrize(
     ("step", "message"),
     [
-        ("place: {}", "A place step needs `at` or `on`"),
+        ("place: {}", "`place` needs `at` or `on`"),
         ("place: {on: a, at: {x: 1, y: 2, z: 3}}", "either `on` or the height z"),
         ("place: {at: {x: 1}}", "The place of an object needs 'y'"),
-        ("place: a", "A place step must be a mapping"),
+        ("place: a", "`place` must be a mapping"),
         ("stack: {object: a, on: a}", "a cannot stand on itself"),
-        ("stack: {object: a}", "A stack needs 'on'"),
-        ("pick: {object: a, side: left}", "Expected one of front, above"),
+        ("stack: {object: a}", "`stack` needs 'on'"),
+        ("pick: {object: a, side: left}", "Expected one of `front`, `above`"),
         ("release: a", "`release` takes no value"),
     ],
 )

@@ -211,8 +211,8 @@ def test_speed_is_a_fraction_of_the_scripts_own(stage: Stage) -> None:
         ("  - home\n  - line: {by: {z: -285}}", 3, "table"),
         ("  - gripper: 90", 2, "range of the fingers"),
         ("  - tool: hammer", 2, "no tool"),
-        ("  - home\n  - line: {by: {y: 0}}", 3, "line moves nothing"),
-        ("  - arc: {centre: [400, 0, 200], axis: x, angle: 0}", 2, "arc moves nothing"),
+        ("  - home\n  - line: {by: {y: 0}}", 3, "`line` moves nothing"),
+        ("  - arc: {centre: [400, 0, 200], axis: x, angle: 0}", 2, "`arc` moves nothing"),
         ("  - circle: {centre: [900, 0, 0], normal: x, radius: 50}", 2, "reach"),
     ],
 )

@@ -72,7 +72,7 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
         ("steps:\n  - line: {to: {x: 1, y: 2}}", 2, "needs 'z'"),
         ("steps:\n  - line: {to: [1, 2, 3], by: [1, 2, 3]}", 2, "`to` or `by`, not both"),
         ("steps:\n  - lines: {through: [[1, 2, 3]]}", 2, "list of 2 to 50"),
-        ("steps:\n  - trajectory: {}", 2, "A trajectory needs 'through'"),
+        ("steps:\n  - trajectory: {}", 2, "`trajectory` needs 'through'"),
         ("steps:\n  - circle:\n      turns: 0\n      radius: x", 3, "`turns` must not be 0"),
         ("steps:\n  - line: {too: 3, to: [1, 2, 3]}", 2, "has no 'too'; did you mean 'to'?"),
         (

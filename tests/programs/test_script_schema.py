@@ -53,8 +53,8 @@ def known_fields(text: str, name: str = "zzz") -> set[str]:
     with pytest.raises(ScriptError) as refused:
         parse(text)
     for problem in refused.value.problems:
-        if match := re.search(rf"has no '{name}'; it may have (.*)\.", problem.text):
-            return set(match[1].split(", "))
+        if match := re.search(rf"has no '{name}'; it may have `(.*)`\.", problem.text):
+            return set(match[1].split("`, `"))
     raise AssertionError(refused.value.problems)
 
 

@@ -150,7 +150,7 @@ class ObjectRequests(RequestHandler):
         arm = self.hub.present()
         scene_object = self._known(request.name)
         if scene_object is None:
-            raise InputError(f"There is no {request.name!r}.")
+            raise InputError(f"There is no object {request.name!r}.")
         to = request.to
         hand = arm.environment.hand
         if request.T is None or hand is None:

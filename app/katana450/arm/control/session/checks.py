@@ -237,7 +237,7 @@ def refusal(state: State, command: cmd.Command) -> str:
             return _held(state, scene_object.name)
         case cmd.Remove(name=name) | cmd.MoveObject(name=name) | cmd.Attach(name=name):
             if named(state.objects, name) is None:
-                return f"There is no {name!r}."
+                return f"There is no object {name!r}."
             on_joint = not isinstance(command, cmd.Remove) and _on_joint(state, name)
             return on_joint or _held(state, name)
     return ""

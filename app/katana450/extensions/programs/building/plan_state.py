@@ -253,7 +253,7 @@ class PlanState:
         for path in {id(path): path for path in paths}.values():
             if float(np.abs(joint_derivatives(path, ALONG)[1]).max()) <= EXACT:
                 raise InputError(
-                    f"This {name} moves nothing: it ends where it begins. Change its "
+                    f"This `{name}` moves nothing: it ends where it begins. Change its "
                     "target or remove it."
                 )
             self._check_joint(path, name)
@@ -273,7 +273,7 @@ class PlanState:
             _, distance, turn = environment.led(self.state.objects, x)
             if distance > MAX_LEAD or turn > MAX_LEAD_TURN:
                 raise InputError(
-                    f"{held.name} is on a joint, and this {name} leads the hand "
+                    f"{held.name} is on a joint, and this `{name}` leads the hand "
                     f"{1e3 * distance:.0f} mm and {math.degrees(turn):.0f} deg off it. Move the "
                     "tool along the joint and in its range, or release it first."
                 )
@@ -318,7 +318,7 @@ class PlanState:
         """Return the object ``name``. Raises InputError with the known names."""
         scene_object = named(self.state.objects, name)
         if scene_object is None:
-            known = ", ".join(known.name for known in self.state.objects) or "none"
+            known = ", ".join(repr(known.name) for known in self.state.objects) or "none"
             raise InputError(f"There is no object {name!r}. Known objects: {known}.")
         return scene_object
 

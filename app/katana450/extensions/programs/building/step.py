@@ -125,7 +125,7 @@ class Step(Declared):
         if word:
             STEPS[word], cls.word = cls, word
             if "noun" not in vars(cls):
-                cls.noun = f"an {word}" if word[0] in "aeiou" else f"a {word}"
+                cls.noun = f"`{word}`"
 
     @property
     def title(self) -> str:

@@ -88,7 +88,7 @@ def or_known(name: str, known: Collection[str]) -> str:
     near = difflib.get_close_matches(name, known, 1)
     if near:
         return f"; did you mean {near[0]!r}?"
-    return f"; it may have {', '.join(known)}." if known else "; it has no fields."
+    return f"; it may have `{'`, `'.join(known)}`." if known else "; it has no fields."
 
 
 Schema = dict[str, Any]

@@ -161,7 +161,7 @@ FUNCTIONS = (*OF_ANGLE, *TO_ANGLE, *KEEPING, *OF_MANY, "sqrt", "atan2")
 
 def _call(name: str, values: list[Quantity]) -> Quantity:
     if name not in FUNCTIONS:
-        raise ExpressionError(f"there is no function {name!r}; there are {', '.join(FUNCTIONS)}")
+        raise ExpressionError(f"there is no function {name!r}; choose from {', '.join(FUNCTIONS)}")
     numbers = [quantity.value for quantity in values]
     if name in OF_MANY and values:
         kind = values[0]

@@ -194,7 +194,7 @@ def choice(*names: str) -> Kind[str]:
 
     def read(value: YamlValue, _context: ScriptContext) -> str:
         if value.held not in names:
-            raise value.wrong(f"Expected one of {', '.join(names)}, not {value}.")
+            raise value.wrong(f"Expected one of `{'`, `'.join(names)}`, not {value}.")
         return str(value.held)
 
     return Kind(read, {"enum": list(names)})

@@ -143,7 +143,7 @@ def binding(planning: ToolPlanning, nearest: NearestPlace) -> str:
         causes.append("axis 1 is in the way")
     if not causes or best.reach:
         causes.append(_links(planning, best.q))
-    return " and ".join(causes)
+    return "; ".join(causes)
 
 
 def _binding_axes(planning: ToolPlanning, nearest: NearestPlace) -> tuple[int, ...]:
@@ -216,7 +216,7 @@ def _missed(nearest: NearestPlace) -> str:
         return "".join(missed) or roll
     if best.rotation_error > (CLEAR_TURN if missed else ANGLE_WORTH_TELLING):
         missed.append(f"its orientation is {math.degrees(best.rotation_error):.3g} deg off")
-    return " and ".join(missed)
+    return "; ".join(missed)
 
 
 def _links(planning: ToolPlanning, q: FloatArray) -> str:

@@ -133,7 +133,7 @@ class StepBlock(Declared):
 class Until(Declared):
     """Repeat until this holds after the steps."""
 
-    noun = "an until"
+    noun = "`until`"
 
     condition: Annotated[Condition, CHOICE]
 
@@ -142,7 +142,7 @@ class Until(Declared):
 class Repeat(StepBlock):
     """Repeat steps."""
 
-    noun = "a repeat"
+    noun = "`repeat`"
     example = "\n    times: 2\n    steps:\n      - wait: 1"
     excludes = ("until", "index")
 
@@ -173,7 +173,7 @@ class Repeat(StepBlock):
 class ForEach(StepBlock):
     """Do steps once for each value of a list."""
 
-    noun = "a for_each"
+    noun = "`for_each`"
     example = "\n    name: up\n    in: [20, -20]\n    steps:\n      - line: {by: {z: up}}"
 
     name: Annotated[YamlValue, WORD.about("Name of the value in the steps")]
@@ -204,7 +204,7 @@ def _each(
 class If(StepBlock):
     """Steps that depend on one condition, which is measured when the step is reached."""
 
-    noun = "an if"
+    noun = "`if`"
     example = "\n    held: cup\n    then:\n      - wait: 1\n    else:\n      - home"
 
     condition: Annotated[Condition, CHOICE]

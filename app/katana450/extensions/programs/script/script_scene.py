@@ -388,7 +388,7 @@ class SceneDraft(Declared):
         T_palm_tool = _T_palm_tool(session)
         for entry in self.entries:
             if entry.name not in present:
-                return f"there is no {entry.name}"
+                return f"there is no object {entry.name!r}"
             difference = _object_difference(entry, present[entry.name], T_palm_tool)
             if difference:
                 return difference

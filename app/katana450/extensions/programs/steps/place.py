@@ -56,7 +56,7 @@ class PlaceHeld(Step, word="place", example="{at: {x: 300, y: 60}}"):
         in_base: whether ``at`` is in the base frame instead of {S}.
     """
 
-    noun = "a place step"
+    noun = "`place`"
     needs = ("at", "on")
 
     at: Annotated[Spot | None, SPOT] = None
@@ -143,7 +143,7 @@ def held_object(plan: PlanState, step: str) -> SceneObject:
     for scene_object in plan.state.objects:
         if scene_object.held:
             return scene_object
-    raise InputError(f"The hand holds nothing to {step}. `pick` an object first.")
+    raise InputError(f"The hand holds nothing to `{step}`. `pick` an object first.")
 
 
 def check_fall(plan: PlanState, held: SceneObject) -> None:

@@ -70,7 +70,7 @@ class Gripper(Step, word="gripper", example="open"):
         holding: name of the object that they must hold then; "" for any or none.
     """
 
-    noun = "a gripper step"
+    noun = "`gripper`"
     short = "to"
 
     to: Annotated[float | str, FINGERS]
