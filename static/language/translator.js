@@ -19,7 +19,8 @@ const longest = Object.keys(catalogue).filter((key) => HOLE.test(key)).sort((one
 const patterns = longest.map((key) => {
   const literals = key.split(HOLE).map((words) => words.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"));
   const value = literals.join("").length < SHORT ? "((?:(?![.,:] ).)+?)" : "((?:(?!\\. ).)+?)";
-  return { pattern: new RegExp(`^${literals.join(value)}$`), text: catalogue[key] };
+  const end = key.endsWith("}") ? "(?<![.,:;])" : ""; // the mark at the end is looked up by itself
+  return { pattern: new RegExp(`^${literals.join(value)}${end}$`), text: catalogue[key] };
 });
 /** @type {Map<string, string>} */
 const shown = new Map(); // by the English text, and by the shown one
