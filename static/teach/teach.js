@@ -74,7 +74,7 @@ export class Teach {
     this.plan = new Plan(page.say, this);
     this.#player = new Player(page, this, ID);
     const preview = button("Preview", () => this.#player.start(null), { title: "Plan it: show the path of the tool, and times and breakpoints of the steps" });
-    const actions = html("div", { class: "bar" }, this.#play, this.#step, preview, this.#undo, this.#redo);
+    const actions = html("div", { class: "bar" }, this.#play, this.#step, preview, html("div", { class: "history" }, this.#undo, this.#redo));
     const views = html("div", { class: "bar views", role: "group", "aria-label": "Show as" }, ...Object.values(this.#views), this.#add);
     const loop = html("label", {}, "Loop", this.#times, "times");
     const named = html("label", { class: "wide" }, "Name", this.#name);
