@@ -3,6 +3,7 @@ import { element, first, onClick, save, timestamp } from "./dom.js";
 import { picture } from "./viser/pictures.js";
 
 const [NAME, LANGUAGE] = ["katana450.name", "katana450.language"];
+const hover = matchMedia("(hover: hover)");
 const dialog = element("more", HTMLDialogElement);
 const theme = first("#theme select", HTMLSelectElement);
 const language = first("#language select", HTMLSelectElement);
@@ -35,7 +36,8 @@ function open() {
   language.value = document.documentElement.lang;
   refuse("");
   dialog.show();
-  field.select();
+  // On a touch screen the field would open its keyboard.
+  hover.matches ? field.select() : dialog.focus();
 }
 
 async function snapshot() {

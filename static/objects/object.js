@@ -1,5 +1,5 @@
 // The chosen object in the sheet of objects: its looks, size and rotation, what carries it, and the rule for the arm in a zone.
-import { onClick, repeating, styled } from "../dom.js";
+import { onClick, repeating, styled, write } from "../dom.js";
 import { button, html, set } from "../instruments/shape.js";
 import { readObjects } from "../server.js";
 
@@ -18,6 +18,9 @@ const MOUNTS = [
 const ZONES = [["None: it is a body", "none"], ["The arm keeps out", "keep_out"], ["The arm is slow", "slow"]];
 const NEW_ZONE = /** @type {Partial<Api.Place>} */ ({ shape: "box", size: [0.2, 0.2, 0.2] }); // m
 const NEW_PLANE = /** @type {Partial<Api.Place>} */ ({ shape: "plane", size: [0.8, 0.6], T: [[1, 0, 0, 0.3], [0, 0, -1, 0.45], [0, 1, 0, 0.3], [0, 0, 0, 1]] }); // m
+
+/** What the numbers of a size are, of shapes other than boxes. @type {Record<string, string>} */
+const SIZES = { sphere: "Radius, mm", cylinder: "Radius × height, mm", vessel: "Radius × height, mm" };
 
 /** Return the rotation of an object about the vertical [degrees]. @param {number[][]} T */
 const turnOf = (T) => Math.round(Math.atan2(T[1][0], T[0][0]) * DEGREES) + 0;
@@ -43,6 +46,7 @@ export class ObjectForm {
   #opacity = this.#input("opacity", { type: "range", min: 5, max: 100, step: 1 }, (value) => ({ opacity: Number(value) / 100 }));
   #scale = this.#input("scale", { type: "number", min: 0.001, max: 1000, step: "any", inputmode: "decimal" }, (value) => (value ? { scale: Number(value) } : {}));
   #size = this.#input("size", { type: "text" }, (value) => ({ size: this.#sizeOf(value) }));
+  #sizeLabel = html("span");
   #zone = html("select", {}, ...ZONES.map(([label, zone]) => new Option(label, zone)));
   #turn = this.#input("turn", { type: "range", min: -180, max: 180, step: 1 }, (value) => this.#turned(Number(value)));
   #hidden = html("input", { type: "checkbox" });
@@ -65,7 +69,7 @@ export class ObjectForm {
       html("div", {}, this.#choice, this.#remove),
       html("div", {}, row("Colour", this.#colour), this.#own),
       row("Opacity", this.#opacity, this.#values.opacity),
-      row("Size, mm", this.#size),
+      html("label", {}, this.#sizeLabel, this.#size),
       row("Scale", this.#scale),
       row("Turn", this.#turn, this.#values.turn),
       row("Zone", this.#zone),
@@ -155,6 +159,7 @@ export class ObjectForm {
     if (this.#scale !== document.activeElement || again) this.#scale.value = String(scale);
     const sides = size.map((side) => Number((1e3 * scale * side).toPrecision(6)));
     if (this.#size !== document.activeElement || again) this.#size.value = sides.join(" × ");
+    write(this.#sizeLabel, SIZES[object.shape] ?? "Size, mm");
     this.#size.readOnly = object.shape === "mesh";
     this.#zone.value = zone ?? "none";
     this.#turn.value = String(turnOf(T));

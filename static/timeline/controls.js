@@ -43,6 +43,8 @@ export class Controls {
   moment = html("time", { "aria-live": "off" });
   pastWords = html("span", {}, "Shown as it was at ");
   legend = html("p", { class: "legend" }, ...Object.entries(KINDS).map(([kind, words]) => html("span", { "data-kind": kind }, html("i", { class: kind }), words)));
+  #note = html("p", { role: "status" });
+  #words = [this.pastWords, this.moment, html("span", {}, ", arm is elsewhere")];
   past = html("div", { id: "past", hidden: "" });
 
   /** @param {HTMLElement} box @param {Acts} acts */
@@ -52,8 +54,8 @@ export class Controls {
     this.speed.value = "1";
     const back = titled("Back to live", acts.live);
     back.className = "main";
-    const restore = titled("Continue the run from this moment: the arm, the objects and the water are set back to it", acts.restore, "Continue from here");
-    this.past.append(html("p", { role: "status" }, this.pastWords, this.moment, ", arm is elsewhere"), restore, back);
+    const restore = titled("Continue from here: the arm, the objects and the water are set back to this moment", acts.restore, "Continue from here");
+    this.past.append(this.#note, restore, back);
     const fold = titled("Fold the timeline away", acts.fold, "×");
     fold.className = "fold";
     const track = html("div", { class: "track" }, this.marks, this.now, this.begin, this.end);
@@ -65,6 +67,13 @@ export class Controls {
         this.legend, fold, this.file);
     // From below: the track stays where it is when the rest is shown.
     box.replaceChildren(html("div", { class: "body" }, track, row, this.work, this.plot));
+  }
+
+  /** Show or hide the note over the scene, which is empty while hidden. @param {boolean} shown */
+  showPast(shown) {
+    if (this.past.hidden !== shown) return;
+    this.past.hidden = !shown;
+    this.#note.replaceChildren(...(shown ? this.#words : []));
   }
 
   /** Show whether the recording plays. @param {boolean} plays */

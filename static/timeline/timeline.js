@@ -125,7 +125,7 @@ export class Timeline {
     this.#t = null;
     this.#hidden = false;
     this.#scene?.hideNodes(null);
-    this.#part.past.hidden = true;
+    this.#part.showPast(false);
     this.#grow(this.#pinned);
     api.hide(this.#page.name).catch(() => {});
     this.#draw();
@@ -261,7 +261,7 @@ export class Timeline {
   #seek(t) {
     if (!this.#spans.length) return this.#page.toast(NOTHING);
     this.#t = t;
-    this.#part.past.hidden = false;
+    this.#part.showPast(true);
     this.#grow(true);
     this.#draw();
     this.#request();
