@@ -68,7 +68,7 @@ export class Episodes {
     this.#list.addEventListener("focusout", () => setTimeout(() => this.#fill()));
     const task = html("label", { class: "task" }, "Task", this.#task);
     this.sheet = html("section", { id: "episodes", class: "sheet", "aria-label": "Episodes", hidden: "" }, task, this.#rec, this.#says, this.#acts, this.#list, this.#about);
-    element("dock", HTMLElement).append(this.sheet);
+    element("jog", HTMLElement).before(this.sheet);
     new MutationObserver(() => this.#fill()).observe(this.sheet, { attributeFilter: ["hidden"] });
     // Not when it is open again after a reload: Space, which stops, would type a blank.
     opener.addEventListener("click", () => this.#focus());
@@ -97,7 +97,11 @@ export class Episodes {
     this.#rec.replaceChildren(saving ? "Saving…" : running ? `End episode ${running.number}, ${clock(running.seconds)}` : "Start an episode", key("T"));
     this.#rec.disabled = Boolean(saving);
     this.#rec.classList.toggle("on", Boolean(running));
-    for (const act of this.#acts.querySelectorAll("button")) act.hidden = !(running || saving || last);
+    for (const act of this.#acts.querySelectorAll("button")) {
+      act.hidden = !(running || saving || last);
+      const { act: name = "" } = act.dataset;
+      if (isOutcome(name)) act.setAttribute("aria-pressed", String(!running && !saving && last?.outcome === name));
+    }
     const left = running?.left != null ? ` It ends by itself in ${clock(running.left)}: an episode has at most an hour.` : "";
     const one = last && `Episode ${last.number}, ${extent(last.seconds, last.missing_ticks)}: `;
     const now = saving ? "Saving…" : running ? `Recording episode ${running.number}, by ${running.by}.${left}` : last && last.outcome === "unjudged" ? `${one}how did it go?` : last ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode is kept.";
