@@ -33,7 +33,8 @@ function find(words) {
   if (Object.hasOwn(catalogue, words)) return catalogue[words];
   for (const { pattern, text } of patterns) {
     const values = pattern.exec(words);
-    if (values) return text.replace(/\{(\d)\}/g, (_, number) => translated(values[number]));
+    // A value in quotes is a word of a script.
+    if (values) return text.replace(/(['`]?)\{(\d)\}/g, (_, quote, number) => quote + (quote ? values[number] : translated(values[number])));
   }
   return undefined;
 }
@@ -89,12 +90,29 @@ function translateAttributes(element) {
   }
 }
 
+/** Show the value of a drop-down in the language; scripts read and write it in English. @param {HTMLInputElement} input */
+function translateValue(input) {
+  const shownValue = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value");
+  const value = Object.getOwnPropertyDescriptor(input, "value") ?? shownValue;
+  let words = input.value;
+  /** @param {string} next */
+  const set = (next) => {
+    words = next;
+    value?.set?.call(input, next);
+    shownValue?.set?.call(input, translated(next));
+  };
+  const get = () => (shownValue?.get?.call(input) === translated(words) ? words : value?.get?.call(input));
+  Object.defineProperty(input, "value", { configurable: true, get, set });
+  input.value = words;
+}
+
 /** @param {Node} root */
 function translate(root) {
   const nodes = document.createTreeWalker(root, NodeFilter.SHOW_TEXT | NodeFilter.SHOW_ELEMENT);
   for (let node = /** @type {Node | null} */ (root); node; node = nodes.nextNode()) {
     if (node instanceof Text) translateText(node);
     else if (node instanceof Element) translateAttributes(node);
+    if (node instanceof HTMLInputElement && node.matches("[role=combobox]")) translateValue(node);
   }
 }
 

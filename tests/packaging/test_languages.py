@@ -60,7 +60,7 @@ The places of | The vias of | of a turn | Script of | }in the hand | handled abo
 nothing to {} | You runs | A plan needs | A blend must | A scaling | The tool's | Error in
 The server itself | Path {} | `do` is | not execute it | icence | `t` and | a number of seconds
 not stated | A scene of katana450 | } more | triangle{} | Interrupted | is not handled
-A request about | The clock | run again. Times | recorded: {}
+A request about | The clock | line {}, column | run again. Times | recorded: {}
 """.strip()
     .replace("\n", " | ")
     .split(" | ")
