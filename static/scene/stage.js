@@ -57,15 +57,22 @@ export class Stage {
     });
     scene.addEventListener("load", () => this.#listen());
     // What is held at a stop, or when another person drives, moves nothing afterwards.
-    let stopped = false;
+    let stopped = Boolean(page.store.status?.stopped);
+    this.#fade(stopped);
     page.store.follow((status) => {
       // While the arm is stopped, a new drag is refused with the reason.
       const stops = status.stopped && !stopped;
       stopped = Boolean(status.stopped);
+      this.#fade(stopped);
       if (stops || !(status.mine || status.own_program || status.holder === null)) this.drop();
     });
     document.addEventListener("visibilitychange", () => document.hidden && this.joints.lose());
     window.addEventListener("blur", () => this.#blur());
+  }
+
+  /** Show in the panel whether its buttons move the arm. @param {boolean} stopped */
+  #fade(stopped) {
+    this.#scene.contentDocument?.documentElement.toggleAttribute("data-stopped", stopped);
   }
 
   async #load() {
