@@ -24,7 +24,7 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.forward import forward, jacobian_space
 from tests.general_arms import singular_postures as singular
 from tests.general_arms.driven import pose, session_of, settled
 from tests.general_arms.published_arms import (
@@ -314,3 +314,16 @@ def test_axes_that_almost_meet_have_an_arm_angle(name: str) -> None:
             errors = [max(s.position_error, s.rotation_error) for s in solutions]
             assert min(errors) <= EXACT
     assert lost <= 0.02 * POSES
+
+
+def test_branch_of_axes_that_almost_meet_ends_where_the_arm_is_singular() -> None:
+    """Bend the elbow through its straight posture, beside which both branches lead to one."""
+    chain, q = NEAR_MISS["Gen3"], np.array((0.628, -1.191, -0.111, 0.0, -0.622, -1.717, -1.494))
+    solver, names, sides = kinematics_of(chain), list[str](), list[float]()
+    for elbow in np.linspace(-0.3, 0.3, 60):
+        q[3] = elbow
+        names.append(str(solver.branch_of(q)))
+        # Axis 3 sets the arm angle.
+        sides.append(float(np.linalg.det(np.delete(jacobian_space(chain, q), 2, axis=1))))
+    assert len(set(names)) == 2
+    assert [name == names[0] for name in names] == [side * sides[0] > 0.0 for side in sides]

@@ -164,9 +164,21 @@ class SevenAxes(Kinematics):
     @cached_property
     def branches(self) -> tuple[str, ...]:
         """Names of the branches, in the order of the solutions; see branch_words.py."""
+        joint = self.arm_angle_joint
+        return self._words.in_order(lambda T, q: self.at_arm_angles(T, q[[joint]])[0])
+
+    @cached_property
+    def _words(self) -> BranchWords:
         joints = tuple(k for k in range(7) if k != self.arm_angle_joint)
-        words = BranchWords(self.chain, joints, self.is_reversed)
-        return words.in_order(lambda T, q: self.at_arm_angles(T, q[[self.arm_angle_joint]])[0])
+        return BranchWords(self.chain, joints, self.is_reversed)
+
+    def branch_of(self, q: FloatArray) -> str:
+        """Return the branch of the joint angles `q` (7,) [rad].
+
+        Beside the edge of a branch, both postures of axes that meet lead to one of an arm whose
+        axes miss each other, so its branch is measured at its axes.
+        """
+        return self._words.of(q) if self.rounding.is_corrected else str(super().branch_of(q))
 
     def at_arm_angles(self, T: FloatArray, arm_angles: FloatArray) -> FloatArray:
         """Return the joint angles (N, 8, 7) [rad] at `arm_angles` (N,).
