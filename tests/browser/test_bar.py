@@ -219,8 +219,8 @@ def test_the_page_is_small() -> None:
     ours = ("index.html", "page.css", page_routes.PAGE_SCRIPTS, "link.js", "icon.svg")
     assert sum(sent[name] for name in ours) < 30_300
     assert sum(sent[name] for name in (*ours, SCRIPTS)) < 39_800
-    # Another language than English takes one catalogue.
-    assert all(size < 20_000 for name, size in sent.items() if name.startswith("language/"))
+    # Another language than English takes one catalogue, with the reasons of the server.
+    assert all(size < 40_000 for name, size in sent.items() if name.startswith("language/"))
     # The modules in these scripts are also there alone, for people.
     together = re.compile(r"[^/]*|(page|viser|language)/.*")
     sent = {name: size for name, size in sent.items() if not together.fullmatch(name)}
