@@ -175,7 +175,7 @@ def test_scene_is_written_as_it_is_read(text: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("type: slide", "type: ball", "slide, hinge"),
+        ("type: slide", "type: ball", "`slide`, `hinge`"),
         ("axis: -x", "axis: [0, 0, 0]", "must not be zero"),
         ("range: [0, 120]", "range: [120, 0]", "range of a joint must contain 0"),
         ("range: [0, 120]", "range: [0, .inf]", "number from -4000 to 4000"),

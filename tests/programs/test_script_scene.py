@@ -98,7 +98,7 @@ def test_present_scene_is_accepted(stage: Stage, scene: SceneDraft, beginning: S
         (", 250]", ", 250], scale: 0.5", "post has another shape, size or scale"),
         (", 0, 20]", ", 0, 20], can_be_held: true", "post has another `can_be_held`"),
         (", 0, 20]", ", 0, 20], zone: slow", "post has another `can_be_held` or `zone`"),
-        ("- {name: post", "- {name: pole", "there is no post"),
+        ("- {name: post", "- {name: pole", "there is no object 'post'"),
         ("objects:", f"objects:\n  - {{name: ball, shape: sphere, size: [20], {AT}}}",
          "there is also ball"),
         ("water: 50", "water: 70", "the cup has 70.0 ml of water, not 50.0 ml of water"),
