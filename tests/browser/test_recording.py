@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from katana450.cli.main import main
+from katana450.assembly.robot_session import find_robot
+from katana450.extensions.export.page import FPS, recorded
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
 from tests.browser.page import SCRIPTS
 
 pytestmark = pytest.mark.long
@@ -27,12 +30,12 @@ NOW = "() => Number(document.querySelector('[role=slider]').getAttribute('aria-v
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
-    table = tmp_path / "m.csv"
-    table.write_text(
-        f"t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n{SECONDS},{TURN},-1.19,1.48,0.14\n"
-    )
+    robot, session, _ = find_robot(Settings(), URDF_PATH, None)
+    count = round(FPS * SECONDS)
+    turned = session.ready + np.outer(np.linspace(0.0, 1.0, count + 1), (TURN, 0, 0, 0, 0))
+    states = [session.begin(q, 0.0, number / FPS) for number, q in enumerate(turned)]
     path = tmp_path / "turn.html"
-    assert main(["export", "html", "--out", str(path), "--trajectory", str(table)]) == 0
+    path.write_text(recorded(robot, session, states, 1.0 / FPS, "katana450: m"), "utf-8")
     return path
 
 

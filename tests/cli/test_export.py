@@ -46,9 +46,7 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("c", "--trajectory", "m.csv"), "c has no motion"),
         (("urdf", "--pose", "0,0"), "urdf has no pose"),
-        (("glb", "--trajectory", "m.csv"), "Use --trajectory or --run with html"),
         (("glb", "--pose", "0,0,9"), "axis_3 cannot be at 9 rad"),
         (("glb", "--urdf", "nowhere.urdf"), "no robot description at nowhere.urdf"),
     ],

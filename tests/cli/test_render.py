@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -23,12 +25,14 @@ def test_the_picture_has_the_requested_size(
         assert picture.size == (160, 100)
 
 
-def test_a_picture_of_a_motion_shows_its_end(tmp_path: Path) -> None:
-    table, motion, pose = (tmp_path / name for name in ("m.csv", "motion.png", "pose.png"))
-    table.write_text("t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n1,1.5,-1.19,1.48,0.14\n")
-    assert main(["render", "--out", str(motion), "--trajectory", str(table), *SMALL]) == 0
-    assert main(["render", "--out", str(pose), "--pose=1.5,-1.19,1.48,0.14,0,0", *SMALL]) == 0
-    assert motion.read_bytes() == pose.read_bytes()
+def test_a_picture_of_a_run_shows_its_end(tmp_path: Path) -> None:
+    script, run, pose = (tmp_path / name for name in ("s.yaml", "run.png", "pose.png"))
+    script.write_text("steps:\n  - joints: [80, -68, 85, 8, 0]\n")
+    angles = ",".join(f"{math.radians(angle):.6f}" for angle in (80, -68, 85, 8, 0))
+    assert main(["render", "--out", str(run), "--run", str(script), *SMALL]) == 0
+    assert main(["render", "--out", str(pose), f"--pose={angles},0", *SMALL]) == 0
+    shown, expected = (np.asarray(Image.open(path), float) for path in (run, pose))
+    assert np.abs(shown - expected).mean() < 2.0
 
 
 @pytest.mark.parametrize(
@@ -40,7 +44,6 @@ def test_a_picture_of_a_motion_shows_its_end(tmp_path: Path) -> None:
         (("a.mp4", "--run", "pour", "--fps", "0"), "pictures per second"),
         (("a.mp4", "--run", "nowhere.yaml"), "nowhere.yaml cannot be read"),
         (("a.png", "--pose", "9,0"), "axis_1 cannot be at 9 rad"),
-        (("a.png", "--trajectory", "nowhere.csv"), "nowhere.csv cannot be read"),
         (("nowhere/a.png",), "There is no directory"),
         (("a.png", "--urdf", "nowhere.urdf"), "no robot description"),
     ],

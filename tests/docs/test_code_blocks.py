@@ -238,13 +238,6 @@ def test_toml_and_yaml_are_read(block: CodeBlock) -> None:
     assert read(block.text)
 
 
-@pytest.mark.parametrize("block", code_blocks("csv"), ids=identifier)
-def test_table_of_joint_values_is_exported(block: CodeBlock, folder: Path) -> None:
-    (folder / "motion.csv").write_text(block.text, encoding="utf-8")
-    assert main(["export", "html", "--trajectory", "motion.csv", "--out", "out.html"]) == 0
-    assert (folder / "out.html").is_file()
-
-
 @pytest.mark.parametrize(
     ("command", "option"),
     sorted(

@@ -72,9 +72,3 @@ def test_picture_shows_the_robot(urdf: Path, tmp_path: Path) -> None:
         middle = np.asarray(picture.convert("L"))[35:75, 60:100]
     # The robot is darker than the light background.
     assert np.count_nonzero(middle < 180) > 100
-
-
-def test_page_shows_the_robot(urdf: Path, tmp_path: Path) -> None:
-    path = tmp_path / "one.html"
-    assert main(["export", "html", "--urdf", str(urdf), "--out", str(path)]) == 0
-    assert f"{urdf.stem}: one pose" in path.read_text(encoding="utf-8")

@@ -18,7 +18,6 @@ import katana450
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
-from katana450.extensions.export.playback import load_motion
 from katana450.extensions.recording.files import recording_writer
 from katana450.extensions.recording.files.header import (
     METADATA,
@@ -230,13 +229,12 @@ def test_csv_is_a_motion_that_export_plays(
     out = tmp_path / "run.csv"
     assert main(["record", "export", str(run), "--out", str(out), "--from", "0.5"]) == 0
     assert "rows" in capsys.readouterr().out
-    motion = load_motion(out, described().robot)
+    exported = np.genfromtxt(out, delimiter=",", names=True)
     with RecordingFile.open(run) as file:
         table = columns(file, file.start + 0.5)
-    assert len(motion.t) == len(table["t"])
-    chain = described().robot.require_arm().chain
-    for axis, name in enumerate(chain.names):
-        assert motion.values[name].tobytes() == table["setpoint"][:, axis].tobytes()
+    assert len(exported["t"]) == len(table["t"])
+    for axis in range(5):
+        assert exported[f"theta{axis + 1}"].tobytes() == table["setpoint"][:, axis].tobytes()
     assert records[0].t + 0.4 < table["t"][0]
 
 

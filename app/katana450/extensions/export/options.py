@@ -18,13 +18,11 @@ class ExportFormat(NamedTuple):
         help: description for the help of the command.
         posed: whether it is written at a pose.
         scene: whether it has the objects of a new server.
-        moves: whether it is a page, a single file that plays a motion.
     """
 
     help: str
     posed: bool = False
     scene: bool = False
-    moves: bool = False
 
 
 FORMATS: Mapping[str, ExportFormat] = {
@@ -40,9 +38,6 @@ FORMATS: Mapping[str, ExportFormat] = {
     "glb": ExportFormat("binary glTF 2.0, for browsers, Blender and game engines", posed=True),
     "urdf": ExportFormat("a zip of a ROS 2 package of URDF and meshes"),
     "mjcf": ExportFormat("a zip of a MuJoCo model with actuators, sites, keyframes and its meshes"),
-    "html": ExportFormat(
-        "a page that plays a run, with a time slider; it needs no server", posed=True, moves=True
-    ),
 }
 """The formats by their names."""
 
@@ -60,11 +55,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         help="; ".join(f"{name}: {row.help}" for name, row in FORMATS.items()),
     )
     parser.add_argument(
-        "--out",
-        type=Path,
-        required=True,
-        metavar="DIR",
-        help="directory for the files, or the path of the html file",
+        "--out", type=Path, required=True, metavar="DIR", help="directory for the files"
     )
     parser.add_argument(
         "--no-objects",
@@ -72,36 +63,19 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="vrml and x3d: leave out the cup and the basin of a new server",
     )
-    add_shown_options(parser, "html: ", "all at zero")
+    add_pose_option(parser, "all at zero")
     add_arm_options(parser, tool=False)
 
 
-def add_shown_options(
-    parser: argparse.ArgumentParser, formats: str = "", pose: str = "Home"
-) -> None:
-    """Add the options of what is shown to ``parser``: a pose, a table of a motion, or a run.
-
-    ``formats``: those that show a motion. ``pose``: the default of the pose.
-    """
-    shown = parser.add_mutually_exclusive_group()
-    shown.add_argument(
+def add_pose_option(parser: argparse._ActionsContainer, default: str) -> None:
+    """Add ``--pose`` to ``parser``. ``default``: the pose without it, in words."""
+    parser.add_argument(
         "--pose",
         type=joint_values,
         default=(),
         metavar="Q",
         help="comma-separated values of the driven joints in rad or m, gripper last, such as "
-        f"--pose=0,-1.2,1.4,0.1,0,0.2 (default: {pose})",
-    )
-    shown.add_argument(
-        "--trajectory",
-        type=Path,
-        metavar="FILE",
-        help=f"{formats}motion, a .csv with the columns t,theta1,...,theta5,gripper",
-    )
-    shown.add_argument(
-        "--run",
-        metavar="SCRIPT",
-        help=f"{formats}run that is shown: circle, pour or the file of a script",
+        f"--pose=0,-1.2,1.4,0.1,0,0.2 (default: {default})",
     )
 
 
@@ -111,15 +85,9 @@ def export_format(options: argparse.Namespace) -> int:
     if not row.scene and not options.objects:
         names = " or ".join(named(lambda listed: listed.scene))
         raise InputError(f"{options.format} has no objects. Use --no-objects with {names}.")
-    if not row.moves and (options.trajectory is not None or options.run is not None):
-        raise InputError(f"{options.format} has no motion. Use --trajectory or --run with html.")
     if options.pose and not row.posed:
         names = ", ".join(named(lambda listed: listed.posed))
         raise InputError(f"{options.format} has no pose. Use --pose with {names}.")
-    if row.moves:
-        from katana450.extensions.export.page import write_page
-
-        return write_page(options)
     from katana450.extensions.export.export import export
 
     return export(options)

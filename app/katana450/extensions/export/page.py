@@ -1,11 +1,9 @@
-"""``katana450 export html``: a run as a page that plays it without a server."""
+"""A page that plays states of an arm without a server."""
 
 from __future__ import annotations
 
-import argparse
 import secrets
 from collections.abc import Callable, Iterable
-from pathlib import Path
 
 import viser
 
@@ -14,12 +12,8 @@ from katana450.arm.control.state.state import State
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.atomic import check_writable, write_files, writer_of
-from katana450.errors import InputError
 from katana450.extensions.conduit import ConduitLayer
-from katana450.extensions.export.playback import chosen
 from katana450.extensions.programs.server.traces import TracesLayer
-from katana450.extensions.progress import progress
 from katana450.extensions.water import WaterLayer
 from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
@@ -27,6 +21,9 @@ from katana450.server.view.scenery import Scenery
 from katana450.server.viser_bridge.presets import Preset
 from katana450.server.viser_bridge.recording_page import titled
 from katana450.server.viser_bridge.viser_server import close_server, open_server
+
+FPS = 25.0
+"""States per second in the page; states between them are left out."""
 
 
 def recorded(
@@ -58,32 +55,3 @@ def _scene(server: viser.ViserServer, robot: Robot, session: Session) -> Callabl
     """Build the scene of ``robot``; return what shows a state in it."""
     layers = () if robot.arm is None else (ConduitLayer(), WaterLayer(), TracesLayer())
     return Scenery(server, robot, session, load_props(), NoGestures(), Meshes(), layers).show
-
-
-FPS = 25.0
-"""States per second in the page; states between them are left out."""
-
-
-def write_page(options: argparse.Namespace) -> int:
-    """Write the file; print its name and size. Raises InputError."""
-    path: Path = options.out
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{path} must end in .html.")
-    check_writable(path)
-    shown = chosen(options)
-    title = f"{shown.robot.name}: {_shown(options.run, options.trajectory)}"
-    count = int(shown.duration * FPS) + 1
-    states = [shown.at(number / FPS) for number in range(count)]
-    page = recorded(
-        shown.robot, shown.session, progress(states, count, path.name), 1.0 / FPS, title
-    ).encode()
-    write_files({path: writer_of(page)})
-    print(f"{path}: {len(page)} bytes")
-    return 0
-
-
-def _shown(run: str | None, trajectory: Path | None) -> str:
-    """Return the name of the run or motion, for the title of the page."""
-    if trajectory is not None:
-        return trajectory.stem
-    return "one pose" if run is None else Path(run).stem

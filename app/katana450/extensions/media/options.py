@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from katana450.cli.option_values import add_arm_options, size
-from katana450.extensions.export.options import add_shown_options
+from katana450.extensions.export.options import add_pose_option
 
 CAMERAS = ("free", "front", "side", "top", "tool", "wrist")
 """Camera presets, as on the page, and the camera on the hand; the first is its 3D view."""
@@ -21,7 +21,9 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=".png for a picture, .mp4 for a film",
     )
-    add_shown_options(parser)
+    shown = parser.add_mutually_exclusive_group()
+    add_pose_option(shown, "Home")
+    shown.add_argument("--run", metavar="SCRIPT", help="run: circle, pour or the file of a script")
     parser.add_argument(
         "--camera", choices=CAMERAS, default=CAMERAS[0], help="view (default: %(default)s)"
     )

@@ -21,8 +21,8 @@ def render(options: argparse.Namespace) -> int:
     kind = path.suffix.lower()
     if kind not in (".png", ".mp4"):
         raise InputError(f"{path} must end in .png for a picture or in .mp4 for a film.")
-    if kind == ".mp4" and options.run is None and options.trajectory is None:
-        raise InputError("A film needs a motion. Use --run or --trajectory.")
+    if kind == ".mp4" and options.run is None:
+        raise InputError("A film needs a motion. Use --run.")
     check_traceable()
     check_writable(path)
     if kind == ".mp4":

@@ -9,7 +9,7 @@ from pathlib import Path
 from katana450.cli.option_values import add_server_options, number, size, speed
 
 FORMATS = {
-    "csv": "t,theta1,...,gripper in s, rad and m, as `export html --trajectory` reads it",
+    "csv": "t,theta1,...,gripper in s, rad and m",
     "rosbag2": "a folder that ROS 2 plays as a bag",
     "lerobot": "a folder that LeRobot reads as a dataset, version 3.0",
     "html": "a page that plays it",
