@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -68,9 +69,17 @@ def test_drawn_shapes_count_only_where_no_link_has_collision_shapes(tmp_path: Pa
     assert robot.cautions == ("Not checked for contacts: left.",)
 
 
-def test_rods_that_stand_for_missing_shapes_are_no_bodies(tmp_path: Path) -> None:
+@pytest.mark.parametrize("length", [0.0, 1.0])
+def test_sticks_of_a_robot_without_shapes_are_bodies(tmp_path: Path, length: float) -> None:
     bare = rail().replace("<collision>", "<!--").replace("</collision>", "-->")
-    assert robot_world(read(tmp_path, bare)) == (None, (), (UNCHECKED,))
+    bare = re.sub('<origin xyz="[^"]*"', f'<origin xyz="{length} 0 0"', bare)
+    world, _, cautions = robot_world(read(tmp_path, bare))
+    if length:
+        assert world is not None
+        assert [part.name for part in own(world)] == ["base"]
+        assert len(cautions) == 1
+    else:
+        assert (world, cautions) == (None, (UNCHECKED,))
 
 
 def test_parts_that_move_together_or_touch_at_rest_are_not_checked(tmp_path: Path) -> None:

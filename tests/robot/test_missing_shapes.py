@@ -10,7 +10,6 @@ import pytest
 import trimesh
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.state.messages import UNCHECKED
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.settings import Settings
@@ -21,6 +20,8 @@ from tests.robot.urdf_files import saved
 
 SHAPE = re.compile(r"<(cylinder|box) [^>]*/>")
 ESTIMATED = "Contacts are estimated, because shapes cannot be read:"
+SHAPED = re.compile("<(visual|collision)>.*?</(visual|collision)>")
+SHAPELESS = "Contacts are estimated, because the file gives no shapes:"
 MISSING = '<mesh filename="package://ur/none.stl"/>'
 
 
@@ -28,14 +29,25 @@ def read(tmp_path: Path, text: str) -> DescribedRobot:
     return find_robot(Settings(), saved(tmp_path, text), None)
 
 
-def test_arm_without_its_meshes_stops_before_the_table_and_says_what_is_estimated(
-    tmp_path: Path,
+STICKS = "base_link, upper_arm, forearm, wrist_1, wrist_2"
+
+
+@pytest.mark.parametrize(
+    ("text", "cautions"),
+    [
+        (
+            SHAPE.sub(MISSING, ur5e()),
+            ("Not checked for contacts: shoulder, wrist_3.", f"{ESTIMATED} {STICKS}."),
+        ),
+        (SHAPED.sub("", ur5e()), (f"{SHAPELESS} {STICKS}.",)),
+    ],
+    ids=["without its meshes", "without shapes"],
+)
+def test_arm_without_shapes_stops_before_the_table_and_says_what_is_estimated(
+    tmp_path: Path, text: str, cautions: tuple[str, ...]
 ) -> None:
-    robot, session, notes = read(tmp_path, SHAPE.sub(MISSING, ur5e()))
-    assert robot.cautions == (
-        "Not checked for contacts: shoulder, wrist_3.",
-        f"{ESTIMATED} base_link, upper_arm, forearm, wrist_1, wrist_2.",
-    )
+    robot, session, notes = read(tmp_path, text)
+    assert robot.cautions == cautions
     assert set(robot.cautions) <= set(notes)
     for elbow in (0.0, 1.0):
         state = settled(session, begun(session), [cmd.Joint(2, -np.pi / 2.0)])
@@ -91,14 +103,6 @@ def test_mechanism_without_its_meshes_keeps_its_table(tmp_path: Path) -> None:
     assert session.world is not None
     (table,) = (part for part in session.world.parts if part.name == "table")
     assert table.T_mover_shape[0][2, 3] == 0.0
-
-
-def test_robot_that_names_no_shapes_is_not_checked(tmp_path: Path) -> None:
-    bare = re.sub("<(visual|collision)>.*?</(visual|collision)>", "", ur5e())
-    robot, session, notes = read(tmp_path, bare)
-    assert robot.cautions == (UNCHECKED,)
-    assert session.world is None
-    assert UNCHECKED in notes
 
 
 def test_sizes_and_places_that_look_wrong_are_named(tmp_path: Path) -> None:

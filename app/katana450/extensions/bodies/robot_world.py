@@ -114,7 +114,8 @@ def cautions(
         yield f"Not checked for contacts: {', '.join(unchecked)}."
     estimated = [part.name for part in world.parts if part.name in unknown]
     if estimated:
-        yield f"Contacts are estimated, because shapes cannot be read: {', '.join(estimated)}."
+        reason = "the file gives no shapes" if _is_shapeless(robot) else "shapes cannot be read"
+        yield f"Contacts are estimated, because {reason}: {', '.join(estimated)}."
     yield from _implausible(robot, world, x)
 
 
@@ -216,14 +217,16 @@ def drawn(link: Link) -> tuple[Visual, ...]:
 def with_estimates(robot: Robot, pieces: Pieces) -> tuple[Robot, frozenset[str]]:
     """Return ``robot`` with shapes for all links that have a stick, and the links of unknown shape.
 
-    What is drawn replaces collision shapes that are missing. ``pieces``: see ``world_of``.
+    What is drawn replaces collision shapes that are missing. Where no link has a shape, all sticks
+    get some. ``pieces``: see ``world_of``.
     """
     links, unknown = [], []
+    shapeless = _is_shapeless(robot)
     for link in robot.links:
         visuals, collisions = link.visuals, link.collisions
         if robot.collides and link.missing[1]:
             collisions = (*collisions, *drawn(link))
-        if _is_unknown(robot, link, collisions, pieces):
+        if (shapeless and link.visuals) or _is_unknown(robot, link, collisions, pieces):
             unknown.append(link.name)
             capsules = _capsules(robot, link)
             if robot.collides:
@@ -232,6 +235,11 @@ def with_estimates(robot: Robot, pieces: Pieces) -> tuple[Robot, frozenset[str]]
                 visuals = (*drawn(link), *capsules)
         links.append(replace(link, visuals=visuals, collisions=collisions))
     return replace(robot, links=tuple(links)), frozenset(unknown)
+
+
+def _is_shapeless(robot: Robot) -> bool:
+    """Return whether the description of ``robot`` names no shape at all."""
+    return not any(link.collisions or drawn(link) or any(link.missing) for link in robot.links)
 
 
 def _is_unknown(robot: Robot, link: Link, collisions: Sequence[Visual], pieces: Pieces) -> bool:
