@@ -3,7 +3,6 @@ import { queryOf, request } from "../server.js";
 
 /** @typedef {[start: number, end: number]} Span */
 /** @typedef {[t: number, kind: string, words: string, since: number | null]} Mark */
-/** @typedef {{ t: number[], joints: number[], slides: number[], tool: number[] }} Difference */
 const API = "api/v1/playback";
 export const RING = "ring"; // name of the last minutes
 
@@ -28,9 +27,6 @@ export const hide = (page) => post(`${API}/hide?page=${page}`);
 
 /** Let the arm continue from a moment. @param {Record<string, string | number>} query @returns {Promise<{ ticket: number }>} */
 export const restore = (query) => post(`${API}/restore?${queryOf(query)}`);
-
-/** Return {t, joints, slides, tool} of two recordings. @param {Record<string, string | number>} query @returns {Promise<Difference>} */
-export const difference = (query) => answered(`${API}/difference?${queryOf(query)}`);
 
 /** Send a file and return {name, note} of its recording. @param {File} file @returns {Promise<{ name: string, note: string }>} */
 export const open = (file) => post(API, file);

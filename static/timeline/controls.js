@@ -27,7 +27,6 @@ const titled = (label, act, ...content) => button(content.length ? content : lab
  */
 
 export class Controls {
-  plot = html("div", { class: "plot", hidden: "" });
   work = html("div", { class: "work", hidden: "" });
   exports = html("select", { "aria-label": "Export the selection" }, option("", "Export…"), ...EXPORTS.map(([name, words]) => option(name, words)));
   clock = html("output", { class: "clock" }, "Live");
@@ -66,7 +65,7 @@ export class Controls {
         titled("Verify the selection: simulate it again and compare every tick", acts.verify, "Verify"),
         this.legend, fold, this.file);
     // From below: the track stays where it is when the rest is shown.
-    box.replaceChildren(html("div", { class: "body" }, track, row, this.work, this.plot));
+    box.replaceChildren(html("div", { class: "body" }, track, row, this.work));
   }
 
   /** Show or hide the note over the scene, which is empty while hidden. @param {boolean} shown */

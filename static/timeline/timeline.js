@@ -7,7 +7,6 @@ import * as api from "./api.js";
 import { atPlace, lengthOf, placeOf } from "./axis.js";
 import { bars } from "./bars.js";
 import { Controls, option, timeInWords } from "./controls.js";
-import { Plot } from "./plot.js";
 import { NOTHING, Selection } from "./selection.js";
 
 /** @typedef {{ of: string, begin: number, spans: api.Span[], mine: number }} SecondRun */
@@ -25,7 +24,6 @@ export class Timeline {
   #page;
   #box;
   #part;
-  #plot;
   #selection;
   #of = api.RING; // the recording
   #names = new Map([[api.RING, "Last minutes"]]);
@@ -63,7 +61,6 @@ export class Timeline {
       verify: () => this.#selection.process(this.#selected(), "verify", "Verify"),
     });
     page.stage.append(this.#part.past);
-    this.#plot = new Plot(this.#part.plot);
     this.#selection = new Selection(page, this.#part.work);
     this.#list();
     this.#listen();
@@ -228,7 +225,6 @@ export class Timeline {
   /** @param {string} choice */
   async #compare(choice) {
     this.#second = null;
-    this.#plot.draw(null);
     if (choice) {
       try {
         const of = choice === "here" ? this.#of : choice;
@@ -236,7 +232,6 @@ export class Timeline {
         const begin = choice === "here" ? (this.#t ?? spans[0][0]) : spans[0][0];
         const mine = this.#selection.start(this.#spans);
         this.#second = { of, begin, spans, mine };
-        this.#plot.draw(await api.difference({ of: this.#of, t: mine, second: of, t2: begin }));
         this.#seek(mine);
       } catch (error) {
         this.#page.toast(messageOf(error));
@@ -356,7 +351,6 @@ export class Timeline {
     const percent = (x) => `${length ? (100 * x) / length : 0}%`;
     marks.style.setProperty("--begin", percent(ends[0]));
     marks.style.setProperty("--end", percent(ends[1]));
-    if (this.#second) this.#plot.mark(place - placeOf(this.#spans, this.#second.mine));
   }
 
   // Return the moment that is shown, and the events at it, in words.

@@ -306,7 +306,6 @@ def test_selection_is_saved_opened_and_compared(
     # Beside the last minutes, on one clock.
     lists.select_option("ring")
     page.page.get_by_label("Second run").select_option(label="part.mcap")
-    page.page.locator("#timeline .plot polyline").first.wait_for()
     page.wait_until(lambda: page.shows("/playback/1/arm"), "the second arm")
     place(page, 1.0)
     second = part.at(at_place(part.spans, 1.0))

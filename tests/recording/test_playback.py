@@ -1,4 +1,4 @@
-"""Play back: the recorded states at any moment, marks, spans, and the difference of two runs."""
+"""Play back: the recorded states at any moment, marks, and spans."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.records import Chunk
-from msgspec import structs
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
@@ -53,7 +52,7 @@ from katana450.extensions.recording.messages import EVENTS
 from katana450.extensions.recording.playback import run as run_module
 from katana450.extensions.recording.playback import store
 from katana450.extensions.recording.playback.marks import Mark, add_marks
-from katana450.extensions.recording.playback.routes import PlaybackRoutes, difference
+from katana450.extensions.recording.playback.routes import PlaybackRoutes
 from katana450.extensions.recording.playback.rows import still_flying
 from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.playback.store import RecordingStore, opened
@@ -62,7 +61,7 @@ from katana450.maths.water.flow import VesselMove, Water, WaterFlow
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
-from tests.recording.recorded import ADA, described, header, record, run, state_message
+from tests.recording.recorded import ADA, described, header, record, run
 
 
 @pytest.fixture(scope="module")
@@ -86,9 +85,6 @@ def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]
             if not wanted.carried and wanted.name in poses:
                 np.testing.assert_allclose(poses[wanted.name], wanted.T, atol=2e-6)
         assert {"cup", "basin"} <= poses.keys()
-        (row,) = run.rows_at([tick.t + shift + 1e-6])
-        assert row is not None
-        assert row.joints == moment.row.joints
         if tick.state.poured is not None and moment.water is not None:
             inside = tick.state.poured.water.cup.volume
             assert moment.water.cup.volume == pytest.approx(inside, abs=1e3)
@@ -352,32 +348,6 @@ def test_axis_leaves_out_the_rests() -> None:
     assert place_of(spans, 50.0) == 3.0
     assert (at_place(spans, -1.0), at_place(spans, 99.0)) == (10.0, 104.0)
     assert at_place((), 1.0) == 0.0
-
-
-def test_difference_is_that_of_the_worst_joint_and_of_the_tools() -> None:
-    first = state_message([0.0, 0.1], position=(0.3, 0.0, 0.1))
-    second = structs.replace(first, q=[np.radians(3.0), 0.1], position=(0.3, 0.004, 0.103))
-    times, turning = [0.0, 1.0, 2.0], (False, False)
-    report = difference(times, [first, first, None], [first, second, second], turning)
-    assert report.t == [0.0, 1.0]
-    assert report.joints == pytest.approx([0.0, 3.0])
-    assert report.tool == pytest.approx([0.0, 5.0])
-    assert report.slides == []
-    with pytest.raises(InputError, match="2 and 1 joints"):
-        difference([0.0], [first], [structs.replace(first, q=[0.0])], turning)
-    # Two runs of another robot than that of the server.
-    with pytest.raises(InputError, match="2 and 2 joints, the robot 3"):
-        difference([0.0], [first], [second], (False,) * 3)
-
-
-def test_difference_of_joints_that_slide_is_a_length() -> None:
-    first = state_message([0.0, 0.1])
-    second = structs.replace(first, q=[np.radians(3.0), 0.107])
-    report = difference([0.0], [first], [second], (False, True))
-    assert report.joints == pytest.approx([3.0])
-    assert report.slides == pytest.approx([7.0])
-    assert report.tool == []
-    assert difference([0.0], [first], [second], (True, True)).joints == []
 
 
 @pytest.mark.parametrize("role", [Role.VIEWER, Role.OPERATOR])

@@ -99,13 +99,6 @@ class PlaybackWindows:
             )
 
     @property
-    def slides(self) -> tuple[bool, ...]:
-        """One flag for each joint: whether it slides. Those of an arm turn."""
-        if self._robot.arm is None:
-            return self._robot.joint_group.slides
-        return (False,) * len(self._session().ready)
-
-    @property
     def moving(self) -> list[str]:
         """The nodes of the present arm's links that move, which are drawn at another place."""
         paths: dict[str | None, str] = {None: "/arm"}

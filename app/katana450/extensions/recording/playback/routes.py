@@ -5,13 +5,12 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import msgspec
-import numpy as np
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
@@ -22,8 +21,6 @@ from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.recording.files.simulation import state_after
-from katana450.extensions.recording.files.spans import at_place, length_of, place_of
-from katana450.extensions.recording.messages import StateRow
 from katana450.extensions.recording.playback.drawing import CONTEXTS, PlaybackWindows
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.store import (
@@ -42,56 +39,6 @@ from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.web.admission import client_of
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_LONG, TOO_MANY, TOO_SLOW
 from katana450.server.web.http_api import RouteContext
-
-MAX_POINTS = 200
-"""Number of points of a plot."""
-
-
-class RunDifference(NamedTuple):
-    """Differences at times ``t`` [s] since the start of both runs.
-
-    Attributes:
-        t: the times [s].
-        joints: largest difference of a joint that turns [deg]; empty if none does.
-        slides: largest difference of a joint that slides [mm]; empty if none does.
-        tool: distance of the tool points [mm]; empty for robots without a tool.
-    """
-
-    t: list[float]
-    joints: list[float]
-    slides: list[float]
-    tool: list[float]
-
-
-def difference(
-    times: Sequence[float],
-    first: Sequence[StateRow | None],
-    second: Sequence[StateRow | None],
-    slides: Sequence[bool],
-) -> RunDifference:
-    """Return the differences of the states of two runs at ``times`` [s].
-
-    Times at which one of them has no state are left out. ``slides`` says of each joint whether it
-    slides. Raises InputError for robots with other joints.
-    """
-    rows = RunDifference([], [], [], [])
-    sliding = np.array(slides, dtype=bool)
-    for t, a, b in zip(times, first, second, strict=True):
-        if a is None or b is None:
-            continue
-        counts = len(a.joints), len(b.joints), len(sliding)
-        if len(set(counts)) > 1:
-            raise InputError("The runs have {} and {} joints, the robot {}.".format(*counts))
-        away = np.abs(np.subtract(a.joints, b.joints))
-        rows.t.append(t)
-        if not sliding.all():
-            rows.joints.append(float(np.degrees(away[~sliding].max())))
-        if sliding.any():
-            rows.slides.append(1e3 * float(away[sliding].max()))
-        if a.position is not None and b.position is not None:
-            rows.tool.append(1e3 * float(np.linalg.norm(np.subtract(a.position, b.position))))
-    return rows
-
 
 AT_ONCE, WAITING = 2, 8
 """Maximum number of requests that are worked on, and that wait, at the same time."""
@@ -134,7 +81,6 @@ class PlaybackRoutes:
             Route(f"{path}/show", self._show, methods=["POST"]),
             Route(f"{path}/hide", self._hide, methods=["POST"]),
             Route(f"{path}/restore", self._restore, methods=["POST"]),
-            Route(f"{path}/difference", self._difference),
             Route(f"{path}/{{name}}", self._timeline),
         ]
 
@@ -203,30 +149,6 @@ class PlaybackRoutes:
         except (LeaseError, InputError) as error:
             raise HTTPException(HTTPStatus.CONFLICT, str(error)) from error
         return _json({"ticket": ticket})
-
-    async def _difference(self, request: Request) -> Response:
-        """Return the difference of two recordings over one clock."""
-        query = request.query_params
-        first = self._run(request, query.get("of", RING))
-        second = self._run(request, query.get("second", RING))
-        begins = [_number(query.get(name)) for name in ("t", "t2")]
-        windows = self._known_windows()
-
-        def compare() -> Response:
-            places = [
-                place_of(run.spans, t) for run, t in zip((first, second), begins, strict=True)
-            ]
-            left = [
-                length_of(run.spans) - place
-                for run, place in zip((first, second), places, strict=True)
-            ]
-            times = np.linspace(0.0, max(min(left), 0.0), MAX_POINTS).tolist()
-            one, other = (
-                _rows(run, place, times) for run, place in zip((first, second), places, strict=True)
-            )
-            return _json(difference(times, one, other, windows.slides)._asdict())
-
-        return await self._in_thread(compare)
 
     async def _open(self, request: Request) -> Response:
         """Receive a file, and return the name of its recording."""
@@ -334,11 +256,6 @@ async def _received(request: Request, path: Path, timeout: asyncio.Timeout) -> N
         await asyncio.to_thread(file.write, bytes(part))
     finally:
         await asyncio.to_thread(file.close)
-
-
-def _rows(run: AnyRun, place: float, times: list[float]) -> list[StateRow | None]:
-    spans = run.spans
-    return run.rows_at([at_place(spans, place + t) for t in times])
 
 
 def _moment_content(moment: RecordedMoment | None) -> dict[str, Any] | None:

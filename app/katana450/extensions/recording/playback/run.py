@@ -14,7 +14,6 @@ from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import ChunkSpan, Message, RecordingFile
 from katana450.extensions.recording.files.simulation import (
     TickReader,
-    content_of,
     recorded_input,
 )
 from katana450.extensions.recording.files.spans import Span, spans_of
@@ -24,7 +23,6 @@ from katana450.extensions.recording.messages import (
     EVENTS,
     SOLIDS,
     STATE,
-    StateRow,
     TickMessage,
 )
 from katana450.extensions.recording.playback.marks import Mark, add_marks
@@ -182,26 +180,6 @@ class PlaybackRun:
                 if file.index.last_before(CHECKPOINTS, t) is not None:
                     return list(recorded_input(file.index, t, t))
         raise InputError("Nothing complete is recorded before this moment. Choose a later one.")
-
-    def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
-        """Return joints and tool at each of ``times`` [s], without objects; None before the first.
-
-        This reads a second of the file at most for each, and keeps nothing.
-        """
-        return [self._row_at(t) for t in times]
-
-    def _row_at(self, t: float) -> StateRow | None:
-        with self._lock:
-            t -= self._offset
-            for file in reversed(self._files):
-                number = bisect_right(file.chunks, t, key=lambda chunk: chunk.start) - 1
-                for chunk in reversed(file.chunks[: number + 1]):
-                    if file.index.has(chunk, STATE):
-                        states = file.index.messages_of(chunk, STATE)
-                        before = [state for state in states if state.t <= t]
-                        if before:
-                            return content_of(before[-1], StateRow)
-            return None
 
     def _places(self, t: float) -> Iterator[_Place]:
         """Yield the blocks in which the state at ``t`` [s] of the files' clock may be."""

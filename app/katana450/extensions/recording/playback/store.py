@@ -30,7 +30,7 @@ from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.recording.files.spans import Span
 from katana450.extensions.recording.folders import SUFFIX, recordings_in
-from katana450.extensions.recording.messages import StateRow, TickMessage
+from katana450.extensions.recording.messages import TickMessage
 from katana450.extensions.recording.playback.marks import Mark
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.run import PlaybackRun
@@ -93,11 +93,6 @@ class OpenedRun:
         """See ``PlaybackRun.input_until``."""
         tick_inputs: list[State | TickInput | TickMessage] = self._ask("input_until", t)
         return tick_inputs
-
-    def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
-        """See ``PlaybackRun.rows_at``."""
-        rows: list[StateRow | None] = self._ask("rows_at", list(times))
-        return rows
 
     def close(self) -> None:
         """End the process, without waiting for a request that it works on."""
