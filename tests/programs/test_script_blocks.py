@@ -72,6 +72,52 @@ def test_step_of_several_lines_is_commented_out() -> None:
     assert (repeat.first, repeat.last, repeat.title) == (3, 6, "repeat times 2")
 
 
+def test_values_of_a_step_are_where_the_text_has_them() -> None:
+    text = TEXT.replace("tool: tcp", "tool: tcp\nlet: {r: 4 cm}").replace(
+        "held: cup", 'held: "cup"'
+    )
+    known = {"objects": ["glass"], "tools": ["tcp", "flange"]}
+    shown = [
+        (value.name, value.text, value.unit, value.step, value.options)
+        for block in blocks_of(read(text), text, known)
+        for value in block.values
+        if text.split("\n")[value.line - 1][value.column - 1 : value.end - 1].strip('"')
+        == value.text
+    ]
+    assert shown == [
+        ("tool", "tcp", "", 0.0, ("tcp", "flange")),
+        ("r", "4 cm", "", 0.0, ()),
+        ("x", "320", "mm", 1.0, ()),
+        ("y", "0", "mm", 1.0, ()),
+        ("z", "150", "mm", 1.0, ()),
+        ("pitch", "50", "deg", 1.0, ()),
+        ("times", "2", "", 1.0, ()),
+        ("by z", "20", "mm", 1.0, ()),
+        ("by z", "-20", "mm", 1.0, ()),
+        ("wait", "1", "s", 1.0, ()),
+        ("held", "cup", "", 0.0, ("cup", "glass")),
+        ("wait", "1", "s", 1.0, ()),
+        ("fill", "100", "ml", 1.0, ()),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("step", "names"),
+    [
+        ("line: {to: [1, 2, 3]}", ["to x", "to y", "to z"]),
+        ("joints: [1, 2, 3]", ["1", "2", "3"]),
+        ("move: up", ["move"]),
+        ("home:", []),
+        ("fly: {at: 3}", ["at"]),
+    ],
+)
+def test_values_have_the_names_of_the_schema(step: str, names: list[str]) -> None:
+    poses, block = blocks(f"poses: {{up: {{joints: [1]}}}}\nsteps: [{step}]\n")
+    assert [value.name for value in poses.values] == ["up joints 1"]
+    assert [value.name for value in block.values] == names
+    assert {value.options for value in block.values if value.name == "move"} <= {("up",)}
+
+
 def test_comments_that_are_no_steps_change_nothing() -> None:
     text = "steps:\n  - home\n  # - homes\n  # - wait: [1\n  # a list: - home\n"
     assert [block.title for block in blocks(text)] == ["home"]

@@ -106,7 +106,9 @@ def number(
             raise value.wrong(f"{amount:g} is not between {low:g} and {high:g}{suffix}.")
         return convert(amount)
 
-    bounds = {"type": "number", "minimum": low, "maximum": high}
+    bounds: Schema = {"type": "number", "minimum": low, "maximum": high}
+    if unit:
+        bounds["unit"] = unit
     return Kind(read, any_of(about or unit, bounds, {"type": "string"}))
 
 
@@ -187,6 +189,11 @@ def _text(value: YamlValue, _context: ScriptContext) -> str:
     if value.kind != "text" or not isinstance(value.held, str) or not value.held.strip():
         raise value.wrong(f"Expected a text, not {value}.")
     return value.held
+
+
+def known(names: str) -> Kind[str]:
+    """Return the kind of a name; ``names`` tells editors which: objects, poses or tools."""
+    return Kind(_text, {"type": "string", "names": names})
 
 
 def choice(*names: str) -> Kind[str]:
@@ -287,7 +294,8 @@ RAW: Kind[YamlValue] = Kind(lambda value, _: value, {})
 """Any value, as it is."""
 
 TEXT: Kind[str] = Kind(_text, {"type": "string"})
-NAME = TEXT.about("Name of an object")
+NAME = known("objects").about("Name of an object")
+POSE_NAME = known("poses").schema
 LENGTH = millimetres(-MAX_COORDINATE, MAX_COORDINATE, "mm, or a text such as 4 cm or 2 * radius")
 ANGLE = angle(-360.0, 360.0)
 TURN = angle()
@@ -303,7 +311,14 @@ _JOINT_ANGLES = listed(degrees(-720.0, 720.0), LEAST_JOINTS, MAX_JOINTS)
 OFFSET = vector(LENGTH, "Motion of the tool point, mm; what is absent is 0", partly=True)
 DIRECTION = defined(
     "direction",
-    Kind(_direction, any_of("A direction: x, -y and so on, or three numbers", _COMPONENTS.schema)),
+    Kind(
+        _direction,
+        any_of(
+            "A direction: x, -y and so on, or three numbers",
+            _COMPONENTS.schema,
+            {"enum": [sign + name for name in XYZ for sign in ("", "-")]},
+        ),
+    ),
 )
 JOINTS = defined(
     "joints",
@@ -399,7 +414,10 @@ def _blend(value: YamlValue, _context: ScriptContext) -> float:
 
 
 _COORDINATES = vector(LENGTH, "A point, mm: {x, y, z}, [x, y, z], or the name of a pose")
-POINT = defined("point", Kind(_point, _COORDINATES.schema))
+POINT = defined(
+    "point",
+    Kind(_point, {**_COORDINATES.schema, "anyOf": [*_COORDINATES.schema["anyOf"][:2], POSE_NAME]}),
+)
 POSE = Kind(_pose, POINT.schema)
 PLACE = defined(
     "place",
@@ -407,7 +425,7 @@ PLACE = defined(
         _place,
         any_of(
             "A place: the name of a pose, angles of the joints, or a point with its orientation",
-            {"type": "string"},
+            POSE_NAME,
             mapping("Angles of the joints", "joints", {"joints": JOINTS.schema}),
             mapping(
                 "A point with its orientation; what is absent stays",
@@ -427,7 +445,12 @@ THROUGH = defined(
     Kind(_PLACES.read, any_of("Places in their order", _PLACES.schema, {"type": "string"})),
 )
 ARC_PITCH = Kind(
-    _arc_pitch, any_of("Pitch of the tool, deg; roomiest is farthest from the limits", ANGLE.schema)
+    _arc_pitch,
+    any_of(
+        "Pitch of the tool, deg; roomiest is farthest from the limits",
+        ANGLE.schema,
+        {"enum": ["keep", ROOMIEST]},
+    ),
 )
 BLEND = Kind(
     _blend,
@@ -473,7 +496,7 @@ SPOT = Kind(
     _spot,
     any_of(
         "Its place: the name of a pose, [x, y, z], or x, y and, if wanted, z, yaw",
-        {"type": "string"},
+        POSE_NAME,
         POINT.schema,
         Spot.schema(),
     ),

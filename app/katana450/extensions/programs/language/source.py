@@ -90,6 +90,7 @@ class YamlValue:
         unit: kind of quantity of the number, see ``expression.Quantity``.
         why: why a text is not an expression with a value; empty if that was not tried.
         last: last line of the text that it takes, from 1.
+        end: column behind it, from 1; 0 for a list, a mapping, and a value of several lines.
     """
 
     line: int
@@ -100,6 +101,7 @@ class YamlValue:
     unit: str = PLAIN
     why: str = ""
     last: int = 0
+    end: int = 0
 
     @property
     def items(self) -> tuple[YamlValue, ...]:
@@ -177,12 +179,13 @@ def _value(node: yaml.Node) -> YamlValue:
         items = tuple(map(_value, node.value))
         last = last if node.flow_style else items[-1].last
         return YamlValue(line, column, items, "list", last=last)
+    end = node.end_mark.column + 1 if last == line else 0
     if node.tag == NULL:
-        return YamlValue(line, column, None, "nothing", last=last)
+        return YamlValue(line, column, None, "nothing", last=last, end=end)
     kind = {TEXT: "text", WHOLE: "whole", REAL: "number"}.get(node.tag, "other")
     text = str(node.value)
     last -= node.style in ("|", ">")
-    return YamlValue(line, column, text, kind, _number(text), last=last)
+    return YamlValue(line, column, text, kind, _number(text), last=last, end=end)
 
 
 def _number(text: str) -> float | None:

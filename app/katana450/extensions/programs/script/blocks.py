@@ -9,15 +9,26 @@ import re
 import textwrap
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
+from typing import NamedTuple
+
+import msgspec
 
 from katana450.extensions.programs.language.source import ScriptError, YamlValue, read
-from katana450.extensions.programs.script.script import KNOWN_STEPS
+from katana450.extensions.programs.script.script import KNOWN_STEPS, STEP_VALUES, Script
+from katana450.extensions.programs.script.step_values import Names, StepValue, names_in, values_of
 
 STEP_LISTS = ("steps", "then", "else")
 """Names of the fields of a step that hold steps."""
 
+SETTINGS = ("tool", "speed", "let", "poses")
+"""Names of the fields of a script, beside its steps, whose values have a block."""
+
 MAX_TITLE = 60
 """Maximum number of characters of a title."""
+
+MAX_VALUES = 40
+"""Maximum number of values of a step that have fields."""
 
 COMMENTED_STEP = re.compile(rf"( *)# - ({'|'.join(KNOWN_STEPS)})(:.*| *| +#.*)$")
 
@@ -34,6 +45,7 @@ class TextBlock:
         depth: number of the blocks around it.
         title: the step for people.
         enabled: whether it is not commented out.
+        values: its values with their places, without those of the steps in it.
     """
 
     first: int
@@ -45,10 +57,22 @@ class TextBlock:
     depth: int
     title: str
     enabled: bool = True
+    values: tuple[StepValue, ...] = ()
 
 
-def blocks_of(script: YamlValue, text: str) -> tuple[TextBlock, ...]:
-    """Return the steps of ``script``, which was read from ``text``, and first its tool frame."""
+class _Source(NamedTuple):
+    """The lines of a script, those of steps that are commented out, and the known names."""
+
+    lines: Sequence[str]
+    disabled: Collection[int]
+    names: Names
+
+
+def blocks_of(script: YamlValue, text: str, names: Names | None = None) -> tuple[TextBlock, ...]:
+    """Return the steps of ``script``, which was read from ``text``, and first its settings.
+
+    ``names``: known names of objects and tools, beside those that it gives.
+    """
     lines = text.split("\n")
     if len(f"{text}.".splitlines()) != len(lines):
         return ()
@@ -57,14 +81,20 @@ def blocks_of(script: YamlValue, text: str) -> tuple[TextBlock, ...]:
         script = read("\n".join(lines)) if disabled else script
     except ScriptError:
         lines, disabled = text.split("\n"), frozenset()
+    known = names_in(script, names or {})
+    source = _Source(lines, disabled, known)
+    settings: list[TextBlock] = []
     blocks: list[TextBlock] = []
     for name, value in script.fields if script.kind == "mapping" else ():
         if name.held == "steps":
-            blocks += _listed(value, lines, disabled, 0, "")
-        elif name.held == "tool":
+            blocks += _listed(value, source, 0, "")
+        elif name.held in SETTINGS:
             place = value.line, value.last, value.line, value.column
-            blocks.insert(0, TextBlock(*place, None, 0, 0, f"tool {_words(value)}"))
-    return tuple(blocks)
+            schema = Script.schema()["properties"][name.held]
+            values = tuple(islice(values_of(value, schema, known, name.held), MAX_VALUES))
+            title = f"{name.held} {_words(value)}"
+            settings.append(TextBlock(*place, None, 0, 0, title, values=values))
+    return (*settings, *blocks)
 
 
 def _uncomment(lines: list[str]) -> frozenset[int]:
@@ -82,17 +112,16 @@ def _uncomment(lines: list[str]) -> frozenset[int]:
     return frozenset(numbers)
 
 
-def _listed(
-    value: YamlValue, lines: Sequence[str], disabled: Collection[int], depth: int, before: str
-) -> Iterator[TextBlock]:
+def _listed(value: YamlValue, source: _Source, depth: int, before: str) -> Iterator[TextBlock]:
     """Yield the blocks of a list, each followed by those in it. ``before``: begins each title."""
+    lines, disabled, _ = source
     for item in value.items if value.kind == "list" else ():
         inner: list[TextBlock] = []
         for _, held in item.fields if item.kind == "mapping" else ():
             for name, steps in held.fields if held.kind == "mapping" else ():
                 if name.held in STEP_LISTS:
                     prefix = "" if name.held == "steps" else f"{name.held}: "
-                    inner += _listed(steps, lines, disabled, depth + 1, prefix)
+                    inner += _listed(steps, source, depth + 1, prefix)
         enabled = item.line not in disabled
         first, last = item.line, max(item.last, *(block.last for block in inner), 0)
         # A list in brackets does not begin with the dash of its first step.
@@ -105,8 +134,18 @@ def _listed(
                     break
                 last += 1
         place, title = (first, last, item.line, item.column), before + _words(item)
-        yield TextBlock(*place, indent, value.line, depth, title, enabled)
+        values = tuple(islice(_values(item, source), MAX_VALUES))
+        yield TextBlock(*place, indent, value.line, depth, title, enabled, values)
         yield from inner if enabled else ()
+
+
+def _values(step: YamlValue, source: _Source) -> Iterator[StepValue]:
+    """Yield the values of a step; those of one that is commented out stand behind its ``# ``."""
+    for name, held in step.fields if step.kind == "mapping" else ():
+        schema = STEP_VALUES.get(str(name.held), {})
+        for value in values_of(held, schema, source.names, _words(name)):
+            shift = 2 * (value.line in source.disabled)
+            yield msgspec.structs.replace(value, column=value.column + shift, end=value.end + shift)
 
 
 def _comment_column(line: str) -> int:

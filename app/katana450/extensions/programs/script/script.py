@@ -38,6 +38,7 @@ from katana450.extensions.programs.language.kinds import (
     any_of,
     bound,
     choice,
+    known,
     listed,
     mapping,
     number,
@@ -353,7 +354,7 @@ class Script(Declared):
     ] = "shoulder"
     tool: Annotated[
         LocatedStep | None,
-        Kind(_tool, TEXT.schema).about("Tool frame of all points: tcp, grasp or flange"),
+        Kind(_tool, known("tools").schema).about("Tool frame of all points: tcp, grasp or flange"),
     ] = None
     speed: Annotated[float, number(MIN_SPEED, 1.0, about="Fraction of full speed")] = 1.0
     scene: Annotated[SceneDraft | None, SCENE] = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any
 
@@ -71,12 +71,17 @@ class ScriptRoutes:
 
     async def _read(self, request: Request) -> Response:
         """Return problems of a text by line, its blocks if it is YAML, and its poses if all are."""
+        arm = self._context.hub.arm
+        names: dict[str, Iterable[str]] = {}
+        if arm is not None:
+            names["objects"] = [body.name for body in arm.state.objects]
+            names["tools"] = () if arm.robot.arm is None else arm.robot.arm.tools
 
         def reading(text: str) -> Response:
             answer: dict[str, Any] = {"problems": (), "taught": None, "blocks": None}
             try:
                 value = read(text)
-                answer["blocks"] = blocks_of(value, text)
+                answer["blocks"] = blocks_of(value, text, names)
                 answer["taught"] = taught(script_of(value))
             except ScriptError as error:
                 answer["problems"] = error.problems

@@ -148,6 +148,7 @@ Feed = Annotated[
     number(
         0.1,
         1e3 * TOOL_SPEED,
+        "mm/s",
         about="Speed of the tool point, mm/s; slower where limits require it",
         convert=lambda feed: feed / 1e3,
     ),

@@ -26,12 +26,12 @@ from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.declaration import Kind
 from katana450.extensions.programs.language.kinds import (
     FINGER_PLACE,
-    TEXT,
     Length,
     Object,
     ObjectName,
     any_of,
     choice,
+    known,
     number,
     volume,
 )
@@ -57,6 +57,7 @@ FINGERS = Kind(
     any_of(
         "open, closed, or the angle of the fingers, deg; mm if they slide",
         *FINGER_PLACE.schema["anyOf"],
+        {"enum": ["open", "closed"]},
     ),
 )
 
@@ -124,7 +125,7 @@ class Tool(Step, word="tool", example="tcp"):
 
     short = "name"
 
-    name: Annotated[str, TEXT]
+    name: Annotated[str, known("tools")]
 
     def build(self, plan: PlanState) -> PlanState:
         """Append the change of the tool frame. Raises InputError if it does not exist."""

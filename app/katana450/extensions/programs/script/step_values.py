@@ -1,0 +1,124 @@
+"""The values in the steps of a script with their places in the text, for fields of an editor.
+
+What a value may be follows from the JSON Schema of its step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+import msgspec
+
+from katana450.extensions.programs.language.declaration import Schema
+from katana450.extensions.programs.language.kinds import DEFINITIONS, reference
+from katana450.extensions.programs.language.source import YamlValue
+
+Names = Mapping[str, Iterable[str]]
+"""The known names of each kind, as ``names`` in a schema calls it."""
+
+FINE_RANGE = 1.0
+"""Widest range of a number that is changed in steps of FINE_STEP, not of 1."""
+
+FINE_STEP = 0.05
+
+
+class StepValue(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A value that a field of an editor replaces.
+
+    Attributes:
+        name: its name in the step.
+        line, column, end: its place, and the column behind it, from 1.
+        text: the value without quotes.
+        about: description for people.
+        unit: unit of a number; empty for none.
+        step: change of a number by a key; 0 if it is no number.
+        options: texts that it may be, the present one among them.
+        free: whether it may be something else.
+    """
+
+    name: str
+    line: int
+    column: int
+    end: int
+    text: str
+    about: str = ""
+    unit: str = ""
+    step: float = 0.0
+    options: tuple[str, ...] = ()
+    free: bool = False
+
+
+def names_in(script: YamlValue, known: Names) -> Names:
+    """Return the ``known`` names with those of the poses and objects that ``script`` gives."""
+    fields = {name.held: value for name, value in script.fields} if script.kind == "mapping" else {}
+    poses, scene = fields.get("poses"), fields.get("scene")
+    pairs = poses.fields if poses is not None and poses.kind == "mapping" else ()
+    items = scene.items if scene is not None and scene.kind == "list" else ()
+    objects = (pair for item in items if item.kind == "mapping" for pair in item.fields)
+    own = [str(value.held) for name, value in objects if name.held == "name"]
+    names = [str(name.held) for name, _ in pairs]
+    return {**known, "poses": names, "objects": (*own, *known.get("objects", ()))}
+
+
+def values_of(
+    value: YamlValue, schema: Schema, names: Names, name: str, prefix: str = ""
+) -> Iterator[StepValue]:
+    """Yield the values in ``value``, which ``schema`` describes, without the steps in it.
+
+    ``name``: of the value itself; ``prefix`` begins the names of those in it.
+    """
+    if schema == {**schema, **reference("steps")}:
+        return
+    variants = tuple(_variants(schema))
+    if value.kind == "mapping":
+        properties: Schema = {}
+        others: Schema = {}
+        for kind in variants:
+            properties |= kind.get("properties", {})
+            others = kind.get("additionalProperties") or others
+        for key, inner in value.fields:
+            word = f"{prefix}{key.held}".replace("_", " ")
+            part = properties.get(str(key.held), others)
+            yield from values_of(inner, part, names, word, f"{word} ")
+    elif value.kind == "list":
+        items: Schema = next((kind["items"] for kind in variants if "items" in kind), {})
+        # A point may be given by its components, in the same order.
+        mappings = (tuple(kind.get("properties", ())) for kind in variants)
+        numbers = tuple(str(number) for number in range(1, len(value.items) + 1))
+        words = next((keys for keys in mappings if len(keys) == len(numbers)), numbers)
+        for inner, key in zip(value.items, words, strict=True):
+            yield from values_of(inner, items, names, f"{prefix}{key}", f"{prefix}{key} ")
+    elif value.end and schema.get("type") != "null":
+        yield _scalar(value, variants, names, name)
+
+
+def _scalar(value: YamlValue, variants: Iterable[Schema], names: Names, name: str) -> StepValue:
+    text = "" if value.held is None else str(value.held)
+    numeric = next((kind for kind in variants if kind.get("type") == "number"), None)
+    words = [word for kind in variants for word in kind.get("enum", ())]
+    words += (word for kind in variants for word in names.get(kind.get("names", ""), ()))
+    about = next((kind["description"] for kind in variants if "description" in kind), "")
+    step = 0.0
+    if numeric is not None and value.kind in ("whole", "number"):
+        step = FINE_STEP if numeric["maximum"] - numeric["minimum"] <= FINE_RANGE else 1.0
+    return StepValue(
+        name,
+        value.line,
+        value.column,
+        value.end,
+        text,
+        about,
+        "" if numeric is None else numeric.get("unit", ""),
+        step,
+        tuple(dict.fromkeys((text, *words))) if words else (),
+        numeric is not None,
+    )
+
+
+def _variants(schema: Schema) -> Iterator[Schema]:
+    """Yield ``schema`` and what it allows, with the schemas to which it refers."""
+    yield schema
+    if "$ref" in schema:
+        yield from _variants(DEFINITIONS[schema["$ref"].rpartition("/")[2]])
+    for option in schema.get("anyOf", ()):
+        yield from _variants(option)
