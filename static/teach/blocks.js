@@ -7,7 +7,13 @@
  * @property {number} first @property {number} last @property {number} line @property {number} column
  * @property {number | null} indent column of its dash; null if it has no lines of its own
  * @property {number} group line at which its list begins @property {number} depth @property {string} title
- * @property {boolean} enabled
+ * @property {boolean} enabled @property {Value[]} [values] its own ones
+ */
+/**
+ * A value as a part of a line, see `programs/script/step_values.py`. A number has a `step`; what is `free` need not be one of
+ * its options.
+ * @typedef {{ name: string, line: number, column: number, end: number, text: string, about?: string, unit?: string, step?: number,
+ *   options?: string[], free?: boolean }} Value
  */
 /** @typedef {{ line: number, indent: number, group: number, depth: number }} Place before a line, in a list */
 /** @typedef {{ text: string, line: number }} Edit a new text, and the line of the block in it */
@@ -22,8 +28,9 @@ function indexBehind(blocks, i) {
 export const isOnly = (blocks, i) =>
   blocks[i].enabled && !blocks.some(({ group, enabled }, other) => other !== i && enabled && group === blocks[i].group);
 
-/** Return the index of the innermost block at a line; -1 without one. @param {Block[]} blocks @param {number} line */
-export const indexAt = (blocks, line) => blocks.findLastIndex(({ first, last }) => first <= line && line <= last);
+/** Return the index of the innermost block at a place; -1 without one. @param {Block[]} blocks @param {number} line */
+export const indexAt = (blocks, line, place = Infinity) =>
+  blocks.findLastIndex((own) => own.first <= line && line <= own.last && (line > own.line || own.column <= place));
 
 // Return the places to which the block `i` can go, in the order of the lines: before each other block and at the end of
 // each list. `here` is the index of the place where it is.
@@ -93,6 +100,21 @@ export function toggled(text, { line, last, enabled, indent }) {
   const part = lines.slice(line - 1, last).map(enabled ? off : on);
   lines.splice(line - 1, part.length, ...part);
   return { text: lines.join("\n"), line };
+}
+
+// Texts that need no quotes, and those of them that YAML takes for something else.
+const PLAIN = /^[-+]?[\p{L}\d_.(][\p{L}\d_.()+*/ -]*$/u;
+const OTHER = /^(null|true|false|yes|no|on|off)$/i;
+
+/** Return `text` with other words for a value; they keep its quotes. @param {string} text @param {Value} value @param {string} words */
+export function replaced(text, { line, column, end }, words) {
+  const lines = text.split("\n");
+  // Columns count characters, not the units of a text here.
+  const row = [...lines[line - 1]];
+  const isPlain = PLAIN.test(words) && !OTHER.test(words) && !"\"'".includes(row[column - 1] ?? " ");
+  row.splice(column - 1, end - column, (column === end ? " " : "") + (isPlain ? words : JSON.stringify(words)));
+  lines[line - 1] = row.join("");
+  return lines.join("\n");
 }
 
 // Return `text` with a step after the lines of `own`. Without a block it is the first step of a script of this name.

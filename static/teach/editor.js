@@ -1,7 +1,7 @@
 // The text of a script, with the numbers of its lines and what the server says about them.
 import { button, html } from "../instruments/shape.js";
 
-/** @typedef {{ line: number, text: string }} Problem */
+/** @typedef {{ line: number, text: string, column?: number }} Problem */
 /** @typedef {{ problems: Problem[], taught: import("./poses.js").Taught | null, blocks: import("./blocks.js").Block[] | null }} Reading */
 const AFTER = 400; // ms without typing after which the text is checked
 const PLACE = /^line (\d+), column \d+: (.*)$/gm;

@@ -2,6 +2,7 @@
 import { write } from "../dom.js";
 import { button, drawing, html, set, svg } from "../instruments/shape.js";
 import { MAX_WAIT, restsBecause } from "./poses.js";
+import { Values } from "./values.js";
 
 /** @typedef {import("./poses.js").Pose} Pose */
 /** @typedef {"go" | "up" | "down" | "remove" | "grip" | "blend"} Name */
@@ -23,40 +24,23 @@ const SHAPES = {
 export const drawn = (name, act, ...words) =>
   button([drawing("0 0 20 20", svg("path", { d: SHAPES[name] })), ...words], act, { class: name });
 
-/**
- * @param {string} label @param {string} unit @param {number} low @param {number} high @param {number} step
- * @param {(value: number | null) => void} put
- */
-function number(label, unit, low, high, step, put) {
-  const input = html("input", { type: "number", min: low, max: high, step, inputmode: "decimal", "aria-label": label });
-  input.addEventListener("change", () => {
-    const value = input.valueAsNumber;
-    put(Number.isFinite(value) ? Math.round(Math.min(Math.max(value, low), high) * 100) / 100 : null);
-  });
-  return { input, label: html("label", {}, html("span", {}, label), input, html("span", {}, unit)) };
-}
-
 export class Row {
   element = html("li");
   handle = html("div", { class: "handle", title: "Drag to another place" });
   #number = html("b");
   #picture = html("img", { alt: "", draggable: "false", width: "96", height: "72" });
   #buttons;
-  /** @type {HTMLInputElement} */
-  #wait;
-  /** @type {HTMLInputElement} */
-  #speed;
+  #values;
   /** @type {Pose | null} */
   #pose = null;
 
   /** `fingers`: whether there are any. @param {string} id @param {import("./teach.js").Teach} sheet @param {boolean} fingers */
   constructor(id, sheet, fingers) {
     this.element.dataset.id = id;
-    /** @param {"speed" | "wait"} name */
-    const put = (name) => (/** @type {number | null} */ value) => sheet.content.changePose(id, { [name]: value ?? this.#pose?.[name] });
-    const speed = number("Speed", "%", 1, 100, 5, put("speed"));
-    const wait = number("Wait", "s", 0, MAX_WAIT, 0.5, put("wait"));
-    [this.#speed, this.#wait] = [speed.input, wait.input];
+    this.#values = new Values((i, words) => {
+      const value = Math.round(100 * Number(words)) / 100;
+      sheet.content.changePose(id, i ? { wait: value } : { speed: value });
+    });
     /** @type {Record<Name, HTMLButtonElement>} */
     this.#buttons = {
       grip: drawn("grip", () => sheet.toggleGrip(id)),
@@ -69,7 +53,7 @@ export class Row {
     if (!fingers) this.#buttons.grip.hidden = true;
     this.handle.append(this.#picture, this.#number);
     const row = html("div", { class: "acts" }, ...Object.values(this.#buttons));
-    this.element.append(this.handle, html("div", { class: "numbers" }, speed.label, wait.label), row);
+    this.element.append(this.handle, this.#values.element, row);
   }
 
   /** Show the pose `i` of all; `current`: whether the arm moves to it. @param {Pose[]} poses @param {number} i @param {boolean} current */
@@ -84,10 +68,10 @@ export class Row {
       if (pose.picture) this.#picture.src = pose.picture;
       this.#picture.style.visibility = pose.picture ? "" : "hidden";
     }
-    for (const { input, value, words } of [{ input: this.#speed, value: pose.speed, words: "Speed to" }, { input: this.#wait, value: pose.wait, words: "Wait after" }]) {
-      if (input !== document.activeElement || input.value === "" || input.valueAsNumber !== value) input.value = String(value);
-      set(input, "aria-label", `${words} ${name}`);
-    }
+    this.#values.show(name, [
+      { name: "Speed", text: String(pose.speed), unit: "%", step: 5, low: 1, high: 100, about: `Speed to ${name}` },
+      { name: "Wait", text: String(pose.wait), unit: "s", step: 0.5, low: 0, high: MAX_WAIT, about: `Wait after ${name}` },
+    ]);
     const rests = restsBecause(poses, i);
     this.#label("grip", pose.grips ? `The gripper moves at ${name}` : `The gripper stays at ${name}`, false, pose.grips);
     this.#label("blend", rests ? `Rest at ${name}. ${rests}` : `Pass ${name} without a rest`, Boolean(rests), pose.blend && !rests);

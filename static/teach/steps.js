@@ -2,12 +2,13 @@
 // their times, marks and breakpoints.
 import { write } from "../dom.js";
 import { button, html, set } from "../instruments/shape.js";
-import { duplicated, indexAt, inserted, isOnly, moved, placeBeside, placesOf, removed, toggled } from "./blocks.js";
+import { duplicated, indexAt, inserted, isOnly, moved, placeBeside, placesOf, removed, replaced, toggled } from "./blocks.js";
 import { draggable } from "./order.js";
 import { drawn } from "./row.js";
+import { Values } from "./values.js";
 
 const CURRENT = ["shown", "now", "ended here"]; // marks
-const LOCKED = "This step shares its line with others. Edit it in the text.";
+const LOCKED = "This step shares its line with others. Move it in the text.";
 const NEEDED = "Its list needs one step. Insert another one first, or change the step around it.";
 
 /** @typedef {import("./blocks.js").Block} Block */
@@ -24,9 +25,11 @@ export class Steps {
   /** @type {string | null} */
   #asked = null; // the text that the server was asked to read
   #line = 0; // a line of the block that is open
+  #column = Infinity; // a column behind its start
   #edits = Promise.resolve(); // the last one
   #list = html("ol", { class: "steps", "aria-label": "Steps" });
   #menu = html("div", { class: "menu", role: "group", hidden: "" });
+  #values = new Values((i, words) => this.#replace(i, words));
   #buttons;
   #acts;
   element = html("div", {}, this.#list);
@@ -52,15 +55,19 @@ export class Steps {
       text: drawn("text", () => this.#sheet.jump(this.#line)),
       remove: drawn("remove", () => this.#edit("remove", removed)),
     };
-    this.#acts = html("div", { class: "edit" }, html("div", { class: "acts" }, ...Object.values(this.#buttons)), this.#menu);
+    this.#acts = html("div", { class: "edit" }, this.#values.element, html("div", { class: "acts" }, ...Object.values(this.#buttons)), this.#menu);
   }
 
-  /** Open the block at a line, and mark it. @param {number} line */
-  select(line) {
-    this.#line = line;
+  /** Open the block at a place, and mark it. @param {number} line */
+  select(line, column = Infinity) {
+    [this.#line, this.#column] = [line, column];
     this.#open(false);
     this.draw();
-    this.#rows[indexAt(this.#blocks, line)]?.element.scrollIntoView({ block: "nearest" });
+    this.#rows[this.#opened]?.element.scrollIntoView({ block: "nearest" });
+  }
+
+  get #opened() {
+    return indexAt(this.#blocks, this.#line, this.#column);
   }
 
   get #isCurrent() {
@@ -78,26 +85,41 @@ export class Steps {
     return this.#isCurrent && this.#sheet.editor.reading?.blocks !== null;
   }
 
-  // Edit the block that is open. A second press may come before the server has read the text of the first.
-  /** @param {Name} name @param {(text: string, own: Block, i: number) => Edit | undefined} act */
-  #edit(name, act) {
-    this.#edits = this.#edits.then(() => this.#editOne(name, act));
+  // Change the text, after the changes before this one, which the server may still read.
+  /** @param {(text: string) => void} change */
+  #later(change) {
+    this.#edits = this.#edits.then(async () => {
+      const isFresh = await this.#fresh();
+      const text = this.#sheet.shownText;
+      if (isFresh && text !== null) change(text);
+    });
   }
 
+  // Edit the block that is open.
   /** @param {Name} name @param {(text: string, own: Block, i: number) => Edit | undefined} act */
-  async #editOne(name, act) {
-    if (!(await this.#fresh())) return;
-    const i = indexAt(this.#blocks, this.#line);
-    const text = this.#sheet.shownText;
-    const control = this.#buttons[name];
-    if (i < 0 || text === null || control.ariaDisabled === "true") return;
-    const edit = act(text, this.#blocks[i], i);
-    if (edit) this.#take(edit, `${control.ariaLabel}.`);
+  #edit(name, act) {
+    this.#later((text) => {
+      const i = this.#opened;
+      const control = this.#buttons[name];
+      const edit = i >= 0 && control.ariaDisabled !== "true" && act(text, this.#blocks[i], i);
+      if (edit) this.#take(edit, `${control.ariaLabel}.`);
+    });
+  }
+
+  /** Write other words for a value of the block that is open. @param {number} i @param {string} words */
+  #replace(i, words) {
+    const { line, column } = this.#blocks[this.#opened];
+    this.#later((text) => {
+      const value = this.#blocks.find((block) => block.line === line && block.column === column)?.values?.[i];
+      if (!value || value.text === words) return;
+      this.#sheet.content.change({ text: replaced(text, value, words) });
+      this.#sheet.report(`${value.name}: ${words}.`);
+    });
   }
 
   /** @param {Edit} edit @param {string} words */
   #take({ text, line }, words) {
-    this.#line = line;
+    [this.#line, this.#column] = [line, Infinity];
     this.#open(false);
     this.#sheet.content.change({ text });
     this.#sheet.report(words);
@@ -105,7 +127,7 @@ export class Steps {
 
   /** @param {string} step */
   async #insert(step) {
-    const own = (await this.#fresh()) ? this.#blocks[indexAt(this.#blocks, this.#line)] : null;
+    const own = (await this.#fresh()) ? this.#blocks[this.#opened] : null;
     const edit = inserted(this.#sheet.shownText ?? this.#sheet.emptyText, own ?? null, step);
     this.#take(edit, `Insert: ${step.split("\n")[0]}.`);
     this.#buttons.add.focus();
@@ -150,7 +172,7 @@ export class Steps {
   // Put the buttons into the row of the block that is open; the menu alone where there is no step yet.
   /** @param {string | null} text */
   #drawActs(text) {
-    const i = indexAt(this.#blocks, this.#line);
+    const i = this.#opened;
     const focused = document.activeElement;
     this.#rows.forEach(({ name }, other) => set(name, "aria-expanded", other === i));
     const isFirst = text === null;
@@ -164,7 +186,9 @@ export class Steps {
       if (hadFocus && focused instanceof HTMLElement) focused.focus();
     }
     set(this.#menu, "aria-label", isFirst ? "Insert the first step" : `Insert after: ${this.#blocks[i].title}`);
-    if (!isFirst) this.#label(this.#blocks[i], i);
+    if (isFirst) return;
+    this.#label(this.#blocks[i], i);
+    this.#values.show(this.#blocks[i].title, this.#blocks[i].values ?? [], this.#sheet.editor.problems);
   }
 
   /** @param {Block} block @param {number} i */
@@ -196,7 +220,7 @@ export class Steps {
     const pause = button("", () => this.#sheet.plan.toggle(this.#rows[i].steps), { class: "pause", title: "Pause before this step" });
     const run = button("▶", () => this.#sheet.plan.runFrom(this.#rows[i].steps[0]), { title: "Run from this step" });
     const [number, note] = [html("b", { title: "Drag to another place" }), html("span")];
-    const name = button("", () => this.select(name.ariaExpanded === "true" ? 0 : this.#blocks[i].line), { class: "name" });
+    const name = button("", () => this.select(name.ariaExpanded === "true" ? 0 : this.#blocks[i].line, this.#blocks[i].column), { class: "name" });
     const element = html("li", {}, pause, run, number, name, note);
     draggable(element, number, (from, _, over, after) => this.#drop(this.#indexOf(from), this.#indexOf(over), after));
     this.#rows.push({ element, pause, run, number, name, note, steps: [] });

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from playwright.sync_api import Browser, Locator, Page
 
 from katana450.extensions.programs.language.source import read
 from katana450.extensions.programs.script.blocks import TextBlock, blocks_of
 from katana450.extensions.programs.script.script import parse
-from tests.browser.bare_page import ORIGIN, bare_page
+from tests.browser.bare_page import ORIGIN, bare_page, module
 from tests.browser.conftest import OpenPage
 from tests.browser.finger import fingers, middle
 from tests.browser.page import ViserPage
@@ -63,7 +63,7 @@ def open_block(page: ViserPage, title: str) -> None:
 
 
 EDITS = """async ([path, text, blocks]) => {
-    const { duplicated, isOnly, moved, placesOf, removed, toggled } = await import(path);
+    const { duplicated, isOnly, moved, placesOf, removed, replaced, toggled } = await import(path);
     return blocks.flatMap((own, i) => {
         if (own.indent === null) return [];
         const { places } = placesOf(blocks, i);
@@ -71,6 +71,8 @@ EDITS = """async ([path, text, blocks]) => {
         list.push({ name: "copy", ...duplicated(text, own) });
         list.push({ name: "off", ...toggled(text, own) });
         if (!isOnly(blocks, i)) list.push({ name: "remove", ...removed(text, own) });
+        for (const value of own.values)
+            list.push({ name: "same", text: replaced(text, value, value.text), line: own.line });
         return list.map((edit) => ({ own: i, ...edit }));
     });
 }"""
@@ -86,7 +88,7 @@ def test_edits_keep_every_other_line_and_the_structure(browser: Browser, name: s
         return list(blocks_of(read(text), text))
 
     def edits(page: Page, text: str) -> list[dict[str, Any]]:
-        own = [asdict(block) for block in blocks(text)]
+        own = msgspec.to_builtins(blocks(text))
         url = f"{ORIGIN}/static/teach/blocks.js"
         edits: list[dict[str, Any]] = page.evaluate(EDITS, [url, text, own])
         return edits
@@ -96,7 +98,9 @@ def test_edits_keep_every_other_line_and_the_structure(browser: Browser, name: s
         for edit in edits(page, text):
             own, after = before[edit["own"]], edit["text"]
             size = own.last - own.first + 1
-            if edit["name"] == "move":
+            if edit["name"] == "same":
+                assert after == text
+            elif edit["name"] == "move":
                 # A list may be left empty, which the page refuses.
                 lines = sorted(line.strip() for line in text.split("\n"))
                 assert sorted(line.strip() for line in after.split("\n")) == lines
@@ -114,6 +118,21 @@ def test_edits_keep_every_other_line_and_the_structure(browser: Browser, name: s
             moved = [block for block in blocks(after) if block.line == edit["line"]]
             if edit["name"] != "remove" and moved:
                 assert moved[0].title.split()[-1] == own.title.split()[-1]
+
+
+def test_words_for_a_value_have_quotes_where_yaml_needs_them(browser: Browser) -> None:
+    with bare_page(browser) as page:
+        for text, words, changed in (
+            ("- grasp: 𝄞 cup # it", "a: b", '- grasp: "a: b" # it'),
+            ("- grasp: 'a b' # it", "c", '- grasp: "c" # it'),
+            ("- wait: 1", "2 * t", "- wait: 2 * t"),
+            ("- wait:", "2", "- wait: 2"),
+            ("- grasp: a", "no", '- grasp: "no"'),
+        ):
+            (block,) = blocks_of(read(f"steps:\n{text}"), f"steps:\n{text}")
+            own = [f"steps:\n{text}", msgspec.to_builtins(block.values[0]), words]
+            edit = "({ replaced }, own) => replaced(...own)"
+            assert module(page, "teach/blocks.js", edit, own) == f"steps:\n{changed}"
 
 
 @pytest.fixture
@@ -178,6 +197,18 @@ def test_steps_are_edited_and_undone_and_the_text_follows(
     assert remove.get_attribute("aria-disabled") == "true"
     assert "needs one step" in (remove.get_attribute("title") or "")
     assert sheet.errors == []
+
+
+def test_value_is_changed_in_its_field_and_a_mistake_is_shown_there(sheet: ViserPage) -> None:
+    show(sheet, SCRIPT)
+    open_block(sheet, "nudge axis 1, by 20")
+    value = sheet.page.locator("#teach .values input").nth(1)
+    value.fill("900")
+    value.press("Enter")
+    wait_text(sheet, SCRIPT.replace("by: 20", "by: 900"))
+    sheet.page.locator("#teach .values em", has_text="not between -720 and 720").wait_for()
+    press(sheet, "Undo in Programs")
+    sheet.wait_until(lambda: value.input_value() == "20", "the value")
 
 
 @pytest.mark.long

@@ -1,0 +1,57 @@
+// The values of a step or a pose, each in a field.
+import { write } from "../dom.js";
+import { button, clamp, html, set } from "../instruments/shape.js";
+
+/** @typedef {Omit<import("./blocks.js").Value, "line" | "column" | "end"> & { line?: number, column?: number, low?: number, high?: number }} Value */
+
+/** @param {Value} value */
+function inputOf({ options, free, step }) {
+  if (options && !free) return html("select", {}, ...options.map((word) => new Option(word)));
+  return html("input", step ? { type: "number", step } : { spellcheck: "false", autocomplete: "off", autocapitalize: "off" });
+}
+
+export class Values {
+  element = html("div", { class: "values", role: "group" });
+  #shape = ""; // which fields there are
+  /** @type {{ input: HTMLInputElement | HTMLSelectElement, unit: HTMLElement, why: HTMLElement, text: string }[]} */
+  #fields = [];
+  #change;
+
+  /** @param {(i: number, words: string) => void} change called with the index of a value and what was typed for it */
+  constructor(change) {
+    this.#change = change;
+  }
+
+  /** @param {string} title of the step @param {Value[]} values @param {import("./editor.js").Problem[]} problems of the values */
+  show(title, values, problems = []) {
+    const shape = JSON.stringify(values.map(({ name, options, step }) => [name, options, step]));
+    if (shape !== this.#shape) this.element.replaceChildren(...values.map((value, i) => this.#add(value, i)));
+    this.#shape = shape;
+    set(this.element, "aria-label", `Values: ${title}`);
+    values.forEach(({ line, column, text, step, unit = "", about = "" }, i) => {
+      const field = this.#fields[i];
+      // What is being typed stays.
+      if (field.text !== text) field.input.value = field.text = text;
+      set(field.input, "title", about);
+      write(field.unit, step ? unit : "");
+      const problem = problems.find((other) => other.line === line && other.column === column);
+      write(field.why, problem?.text ?? "");
+      set(field.input, "aria-description", field.why.textContent ?? "");
+      set(field.input, "aria-invalid", Boolean(problem));
+    });
+  }
+
+  /** @param {Value} value @param {number} i */
+  #add(value, i) {
+    const { name, options = [], free, step, low = -Infinity, high = Infinity } = value;
+    const [input, unit, why] = [inputOf(value), html("span"), html("em")];
+    this.#fields[i] = { input, unit, why, text: "" };
+    input.addEventListener("change", () => {
+      const words = input.value.trim();
+      input.value = !words ? this.#fields[i].text : step ? String(clamp(Number(words), low, high)) : words;
+      if (words) this.#change(i, input.value);
+    });
+    const words = (free ? options : []).map((word) => button(word, () => this.#change(i, word)));
+    return html("div", {}, html("label", {}, html("span", {}, name), input, unit), ...words, why);
+  }
+}
