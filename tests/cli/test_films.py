@@ -33,7 +33,7 @@ def test_a_film_of_a_motion(tmp_path: Path) -> None:
     output = completed([get_ffmpeg_exe(), "-i", str(path)]).stderr
     assert "160x100" in output
     assert "10 fps" in output
-    assert re.search(r"Duration: 00:00:0[0-3]\.[1-9]0", output)
+    assert re.search(r"Duration: 00:00:0[1-5]\.\d0", output)
 
 
 def test_ctrl_c_leaves_no_partial_film(tmp_path: Path) -> None:

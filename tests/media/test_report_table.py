@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from katana450.extensions.media import figures
-from katana450.extensions.media.measures import PathTrace, PourRecord, measurements
+from katana450.extensions.media.measures import PathTrace, PourRecord
 from katana450.extensions.media.report import Report
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
-from katana450.extensions.programs.script.measures import MeasuredRun
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
-from tests.programs.lagging_driver import LaggingDriver
 
 WATER = {"cup_ml", "basin_ml", "air_ml", "spilled_ml", "cup_tilt_deg"}
 
@@ -56,40 +52,6 @@ def test_table_has_the_water_once_there_is_some(
     assert float(rows[-1]["lip_above_water_mm"]) > 1.0
     without = list(csv.DictReader(io.StringIO(dry[1].csv())))
     assert not WATER & set(without[0])
-
-
-def test_measured_arm_is_apart_from_its_setpoints(
-    tmp_path: Path, dry: tuple[Planned, Report]
-) -> None:
-    plan = plan_script(parse("frame: base\nsteps: [line: {by: {y: 60}}]"), URDF_PATH)
-    arm, start = plan.robot.require_arm(), plan.start
-    offset = np.array((0.003, 0.0, 0.0, 0.0, 0.0))
-    driver = LaggingDriver(arm, start.q, start.gripper, 10, offset)
-    simulation = run_by_clock(plan, driver)
-    commanded, run = measurements(simulation), MeasuredRun.of(arm, simulation.states)
-    report = Report.of(plan.script, simulation, {"measured": "a test"}, ())
-    assert run is not None
-    assert report.values.keys() == commanded.keys() | run.values.keys()
-    for name, value in commanded.items():
-        assert report.values[name] == value, "the measures of the setpoints stay"
-    titles = [line for line in report.lines if not line.startswith(" ")]
-    assert titles == ["Commanded: the plan and its setpoints", "Measured at the arm"]
-    lag = next(line for line in report.lines if line.startswith("  Tracking lag"))
-    assert lag.endswith(f" {run.values['tracking_lag_ms']:.4g} ms")
-    rows = list(csv.DictReader(io.StringIO(report.csv())))
-    for row, q, tick in zip(rows, simulation.states, range(len(rows)), strict=True):
-        assert float(row["measured_theta1_deg"]) == pytest.approx(np.degrees(q.q[0]), rel=1e-15)
-        assert float(row["theta1_deg"]) == np.degrees(report.run.q[tick, 0])
-    pytest.importorskip("matplotlib")
-    files = report.write(tmp_path, WRITTEN)
-    assert tmp_path / "measured.png" in files
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert page.index(titles[0]) < page.index("Executed position") < page.index(titles[1])
-    assert page.index(titles[1]) < page.index("Measured position error")
-    figures = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
-    assert figures["tracking_lag_ms"] == pytest.approx(100.0, abs=3.0)
-    assert figures["measured"] == "a test"
-    assert dry[1].measured is None
 
 
 def test_water_figure_is_drawn(run: tuple[Planned, Report]) -> None:

@@ -11,7 +11,6 @@ import katana450.extensions.programs
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.arm.control.state.state import State
 from katana450.extensions.programs.run.simulation import plan_script, simulated
-from katana450.extensions.programs.script.measures import MeasuredRun
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError
 from katana450.extensions.real_arm.codec.requests import ArmRequest
@@ -26,6 +25,7 @@ from katana450.extensions.real_arm.emulator.firmware import Firmware, RequestErr
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
+from tests.real_arm.measured_run import MeasuredRun
 from tests.real_arm.paper_arm import ENDS, MAP
 
 LIBRARY = Path(katana450.extensions.programs.__file__).parent / "library"

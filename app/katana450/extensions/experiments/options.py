@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 
 from katana450.cli.option_values import add_server_options, speed
-from katana450.extensions.real_arm.plant.axis import PROFILES
 from katana450.resources import URDF_PATH
 
 DEMOS = ("circle", "pour")
@@ -46,12 +45,6 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     add_server_options(parser, "; if none answers on this machine, one is started")
     parser.add_argument(
         "--urdf", type=Path, default=URDF_PATH, metavar="FILE", help="another arm, for --headless"
-    )
-    parser.add_argument(
-        "--plant",
-        choices=sorted(PROFILES),
-        help="simulate an arm with inertia, delay, friction, droop and backlash; for --headless, "
-        "--report, and a server that is started (default: an ideal arm)",
     )
     parser.add_argument(
         "--scene",

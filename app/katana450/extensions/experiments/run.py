@@ -36,8 +36,6 @@ from katana450.extensions.programs.run.simulation import (
 from katana450.extensions.programs.script.script import Script, parse
 from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.extensions.programs.script.script_scene import begun
-from katana450.extensions.real_arm.plant.axis import PROFILES
-from katana450.extensions.real_arm.plant.driver import PlantDriver
 from katana450.extras import MissingExtraError
 from katana450.platform_support import without_interrupts
 from katana450.server.api.program_requests import ProgramOrder, Steer
@@ -86,11 +84,7 @@ def simulate(script: Script, options: Namespace) -> int:
     if options.dry_run:
         _print_tasks(program)
         return 0
-    plant = None
-    if options.plant is not None:
-        profile, start = PROFILES[options.plant], plan.start
-        plant = PlantDriver(robot, start.q, start.gripper, profile)
-    simulation = run_by_clock(plan, plant)
+    simulation = run_by_clock(plan)
     for choice in _choices(program, simulation):
         print(choice)
         notes = (*notes, choice)
@@ -101,7 +95,6 @@ def simulate(script: Script, options: Namespace) -> int:
         "speed": program.speed,
         "ticks_per_s": Settings().rate,
         "seed": options.seed,
-        **({} if plant is None else {"measured": f"a simulated plant, {options.plant}"}),
     }
     report = Report.of(script, simulation, facts, notes)
     print(f"{script.name}: {len(simulation.t)} ticks, {simulation.t[-1]:.2f} s.")
@@ -238,11 +231,6 @@ def _server_at(script: Script, options: Namespace) -> Iterator[str]:
                 f"--scene: the server at {options.url} has a scene already. Load the file in its "
                 "page, or leave --scene out."
             )
-        if options.plant is not None and options.report is None:
-            raise InputError(
-                f"--plant: the server at {options.url} has an arm already. Leave --plant out, or "
-                "add --headless or --report to simulate a plant here."
-            )
         yield options.url
         return
     port = str(urlsplit(options.url).port)
@@ -251,8 +239,6 @@ def _server_at(script: Script, options: Namespace) -> Iterator[str]:
     command = [*python, "serve", "--no-browser", "--port", port, "--urdf", str(options.urdf)]
     if script.bare:
         command.append("--bare")
-    if options.plant is not None:
-        command += ["--plant", options.plant]
     if (scene := _scene_file(script, options)) is not None:
         command += ["--scene", str(scene)]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **without_interrupts())

@@ -13,16 +13,10 @@ import numpy as np
 
 from katana450.extensions.media.measures import PathTrace, PourRecord
 from katana450.extensions.programs.run.simulation import Simulation
-from katana450.extensions.programs.script.measures import Deviation, MeasuredRun
 from katana450.maths.geometry.arrays import FloatArray
-
-RIGHT: dict[str, Any] = {"ha": "right", "va": "top"}
-"""Alignment of a text in the upper right corner."""
 
 INK, FAINT, DESIRED, ERROR = "#1f2933", "#cbd2d9", "#9aa5b1", "#c2410c"
 """Colours of text, grid, desired paths and errors."""
-MEASURED: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 2))}
-"""Lines of measured values over those of setpoints."""
 AXES = ("#0b6e99", "#c2410c", "#2f855a", "#7c3aed", "#a16207", "#be185d", "#475569")
 """Colours of the joints."""
 
@@ -87,55 +81,6 @@ def as_png(draw: Callable[Concatenate[Any, Drawing], Any]) -> Callable[Drawing, 
 
 
 @as_png
-def measured_figure(plt: Any, run: MeasuredRun) -> Any:
-    """Draw the distances from the paths, if there are any, and the errors of the joints."""
-    rows = 2 if run.deviations else 1
-    figure, panels = plt.subplots(
-        rows, 1, figsize=(7.2, 2.6 * rows), sharex=True, layout="constrained", squeeze=False
-    )
-    if run.deviations:
-        _draw_distances(panels[0, 0], run.deviations)
-    _draw_joint_errors(panels[-1, 0], run)
-    return figure
-
-
-def _draw_distances(panel: Any, deviations: tuple[Deviation, ...]) -> None:
-    """Draw the distances of setpoints and measured tool from the paths over time."""
-    measured = commanded = 0.0
-    for deviation in deviations:
-        off = 1e3 * deviation.error
-        panel.plot(deviation.t, off, color=ERROR, linewidth=1.0)
-        sent = 1e3 * deviation.commanded
-        panel.plot(deviation.t_commanded, sent, color=AXES[0], linewidth=1.6)
-        measured = max(measured, float(off.max()))
-        commanded = max(commanded, 1e3 * float(deviation.commanded.max()))
-    panel.set_title("Distance from the path")
-    panel.set_ylabel("distance (mm)")
-    panel.set_ylim(0.0, 1.5 * measured or 1.0)
-    for text, colour, y in (
-        (f"measured: up to {measured:.2g} mm", ERROR, 0.98),
-        (f"setpoints: up to {commanded:.1g} mm", AXES[0], 0.88),
-    ):
-        panel.text(0.99, y, text, transform=panel.transAxes, color=colour, fontsize=8.0, **RIGHT)
-
-
-def _draw_joint_errors(panel: Any, run: MeasuredRun) -> None:
-    """Draw measured joints minus where they should have been over time."""
-    off = np.degrees(run.q - run.due)
-    draw_joints(panel, run.t, off, linewidth=0.9)
-    _label(panel, "Tracking error of the joints", "error (deg)", run.t)
-    panel.margins(y=0.25)
-    panel.legend(
-        loc="upper right",
-        ncols=off.shape[1],
-        fontsize=7.0,
-        handlelength=0.8,
-        columnspacing=0.7,
-        handletextpad=0.4,
-    )
-
-
-@as_png
 def path_figure(plt: Any, paths: Sequence[PathTrace]) -> Any:
     """Draw desired and traced path in 3D, and the error along it (paper's Fig. 7)."""
     figure = plt.figure(figsize=(7.2, 3.9))
@@ -187,9 +132,6 @@ def joints_figure(plt: Any, run: Simulation) -> Any:
     figure, panel = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
     degrees = np.degrees(run.q)
     draw_joints(panel, run.t, degrees, linewidth=1.4)
-    if run.measured is not None:
-        for axis, column in enumerate(np.degrees(run.measured).T):
-            panel.plot(run.t, column, **MEASURED, label=None if axis else "measured")
     panel.legend(**ABOVE, ncols=degrees.shape[1] + 1, handlelength=1.1, columnspacing=1.0)
     _label(panel, "Joint variables", "angle (deg)", run.t)
     return figure

@@ -30,7 +30,6 @@ from katana450.extensions.media.measures import (
 from katana450.extensions.programs.run.simulation import Simulation
 from katana450.extensions.programs.script.measures import (
     MEASURES,
-    MeasuredRun,
     path_fraction,
     title_of,
     unit_of,
@@ -54,7 +53,6 @@ class Report:
         bounds: the bounds that the script expects.
         facts: conditions of the run, by name.
         notes: notes for people.
-        measured: the run as its arm was measured; None for an arm that follows exactly.
     """
 
     script: Script
@@ -63,7 +61,6 @@ class Report:
     bounds: tuple[Bound, ...]
     facts: dict[str, Any]
     notes: tuple[str, ...]
-    measured: MeasuredRun | None = None
 
     @staticmethod
     def of(
@@ -72,11 +69,9 @@ class Report:
         facts: dict[str, Any],
         notes: tuple[str, ...] = (),
     ) -> Report:
-        """Return the report with all measures, also those of a measured arm."""
-        values, measured = measurements(run), MeasuredRun.of(run.arm, run.states)
-        if measured is not None:
-            values |= measured.values
-        return Report(script, run, values, bounds(script, values), facts, notes, measured)
+        """Return the report with all measures."""
+        values = measurements(run)
+        return Report(script, run, values, bounds(script, values), facts, notes)
 
     @property
     def missed(self) -> list[Bound]:
@@ -86,24 +81,9 @@ class Report:
     @property
     def lines(self) -> list[str]:
         """The measures as text lines."""
-        lines: list[str] = []
-        for title, values in self._groups:
-            indent = "  " if self.measured else ""
-            lines += [title] if self.measured else []
-            lines += [
-                f"{indent}{title_of(name):<32} {_with_unit(name, value)}"
-                for name, value in values.items()
-            ]
-        return lines
-
-    @property
-    def _groups(self) -> list[tuple[str, dict[str, float | None]]]:
-        """The measures of setpoints and of the measured arm, apart, with their titles."""
-        if self.measured is None:
-            return [("Measured", self.values)]
-        own = self.measured.values
-        others = {name: value for name, value in self.values.items() if name not in own}
-        return [("Commanded: the plan and its setpoints", others), ("Measured at the arm", own)]
+        return [
+            f"{title_of(name):<32} {_with_unit(name, value)}" for name, value in self.values.items()
+        ]
 
     def json(self, written: datetime) -> str:
         """Return all measures, with units in the names, and their bounds as JSON."""
@@ -135,8 +115,8 @@ class Report:
     def csv(self) -> str:
         """Return one row per tick: time, step, line, task, joints, speeds, fingers, tool, path.
 
-        With water also the columns of `PourRecord`; with a measured arm its joints and tool. Each
-        number has all its digits, so that reading gives the same.
+        With water also the columns of `PourRecord`. Each number has all its digits, so that reading
+        gives the same.
         """
         run, pour = self.run, self._pour
         tasks = [run.program.tasks[number] for number in run.tasks.tolist()]
@@ -152,13 +132,10 @@ class Report:
                 1e3 * np.array(fingers) if slides else np.degrees(fingers)
             ),
             "tool": [state.tool for state in run.states],
-            **self._of_tool(run.q, ""),
+            **self._of_tool(run.q),
             "path_fraction": [path_fraction(state) for state in run.states],
             **({} if pour is None else pour.columns),
         }
-        if run.measured is not None:
-            columns |= _of_joints(run.measured, "measured_theta{}_deg")
-            columns |= self._of_tool(run.measured, "measured_")
         file = io.StringIO()
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(columns)
@@ -166,12 +143,12 @@ class Report:
             rows.writerow(map(_cell, row))
         return file.getvalue()
 
-    def _of_tool(self, q: FloatArray, prefix: str) -> dict[str, FloatArray]:
+    def _of_tool(self, q: FloatArray) -> dict[str, FloatArray]:
         """Return the columns of the tool point at ``q`` (N, n) [rad]."""
         chains = (self.run.arm.chain_to(state.tool) for state in self.run.states)
         points = [1e3 * forward(chain, row)[:3, 3] for chain, row in zip(chains, q, strict=True)]
         x, y, z = np.transpose(points)
-        return {f"{prefix}x_mm": x, f"{prefix}y_mm": y, f"{prefix}z_mm": z}
+        return {"x_mm": x, "y_mm": y, "z_mm": z}
 
     def write(
         self, directory: Path, written: datetime, pictures: Mapping[str, bytes] = NONE
@@ -190,8 +167,6 @@ class Report:
         images = dict(pictures)
         if paths:
             images["path.png"] = figures.path_figure(paths)
-        if self.measured is not None:
-            images["measured.png"] = figures.measured_figure(self.measured)
         images["joints.png"] = figures.joints_figure(self.run)
         images["speeds.png"] = figures.speeds_figure(self.run)
         if self._pour is not None:
@@ -214,10 +189,7 @@ class Report:
             f"<figcaption>{captions[name][1]}</figcaption></figure>"
             for name, image in images.items()
         )
-        tables = "\n".join(
-            f"<h2>{title}</h2>\n<table>\n{_rows(values)}\n</table>"
-            for title, values in self._groups
-        )
+        tables = f"<h2>Measured</h2>\n<table>\n{_rows(self.values)}\n</table>"
         checks = "\n".join(
             f'<li class="{"held" if bound.held else "missed"}">{title_of(bound.name)}: '
             f"{_with_unit(bound.name, bound.value)}; {bound.wanted}</li>"
@@ -265,16 +237,9 @@ CAPTIONS = {
             "the maximum in each half percent of all paths."
         ),
     ),
-    "measured.png": (
-        "The measured arm beside its setpoints: distances from the path, and error of each joint",
-        (
-            "Above: the distances of the setpoints and of the measured tool from the path. Below: "
-            "measured joints minus where the driver had sent them by then."
-        ),
-    ),
     "joints.png": (
         "Joint angles over time",
-        "The setpoints of the arm, a hundred per second. Dashed: where a simulated plant was.",
+        "The setpoints of the arm, a hundred per second.",
     ),
     "speeds.png": (
         "Joint speeds against their limits, and speed of the tool",

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from katana450.cli.option_values import number, port
 from katana450.errors import ConfigurationError
 from katana450.extensions.real_arm.link import PORT
-from katana450.extensions.real_arm.plant.axis import PROFILES
 
 if TYPE_CHECKING:
     from katana450.arm.drivers.driver import Driver
@@ -76,17 +75,10 @@ def add_arm_command_options(parser: argparse.ArgumentParser) -> None:
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 serve`` to ``parser``."""
-    driven = parser.add_mutually_exclusive_group()
-    driven.add_argument(
+    parser.add_argument(
         "--device",
         metavar="ADDRESS",
         help=f"drive a real arm. {ADDRESS_HELP[0].upper()}{ADDRESS_HELP[1:]}. {STOP_BUTTON}",
-    )
-    driven.add_argument(
-        "--plant",
-        choices=sorted(PROFILES),
-        help="simulate an arm with inertia, delay, friction, droop and backlash (default: an ideal "
-        "arm)",
     )
     parser.add_argument(
         "--arm-log", type=Path, metavar="FILE", help="write all exchanges with a Katana450 there"
@@ -94,7 +86,7 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
 
 
 def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> Driver | None:
-    """Return the driver of a real arm or a plant; None if the options choose neither.
+    """Return the driver of a real arm; None if the options name none.
 
     q: (n,) [rad] and gripper [rad] are reported before the first measurement. Raises KatanaError.
     """
@@ -104,11 +96,7 @@ def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> D
         return driver_of(options, robot, q, gripper)
     if options.arm_log is not None:
         raise ConfigurationError("--arm-log needs a real arm: add --device ADDRESS.")
-    if options.plant is None:
-        return None
-    from katana450.extensions.real_arm.plant.driver import PlantDriver
-
-    return PlantDriver(robot, q, gripper, PROFILES[options.plant])
+    return None
 
 
 def view_layer(options: Namespace) -> ViewLayer | None:

@@ -14,7 +14,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.modes import IDLE
 from katana450.arm.control.state.state import State
-from katana450.arm.drivers.driver import Driver, SimulatedDriver
+from katana450.arm.drivers.driver import SimulatedDriver
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.tick import driven
 from katana450.assembly.robot_session import describe_robot
@@ -102,13 +102,6 @@ class Simulation:
         return np.array([state.motion.qd for state in self.states])
 
     @cached_property
-    def measured(self) -> FloatArray | None:
-        """The measured joints (N, n) [rad]; None for an arm that follows exactly."""
-        if self.states[-1].report is None:
-            return None
-        return np.array([state.q for state in self.states])
-
-    @cached_property
     def margin(self) -> FloatArray:
         """The height (N,) of the cup's lip above the water [m]; infinite without water."""
         return np.array([self._margin(state) for state in self.states])
@@ -164,14 +157,9 @@ def plan_script(
     return Planned(script, program, robot, session, start)
 
 
-def run_by_clock(plan: Planned, driver: Driver | None = None) -> Simulation:
-    """Run ``plan`` to its end with a progress bar.
-
-    ``driver``: the arm, at the start of the plan; None for one that follows exactly. Raises
-    KatanaError if it ends early.
-    """
-    if driver is None:
-        driver = SimulatedDriver(plan.robot.require_arm(), plan.start.q, plan.start.gripper)
+def run_by_clock(plan: Planned) -> Simulation:
+    """Run ``plan`` to its end with a progress bar. Raises KatanaError if it ends early."""
+    driver = SimulatedDriver(plan.robot.require_arm(), plan.start.q, plan.start.gripper)
     driver.start(plan.start.t)
     program, session, period = plan.program, plan.session, 1.0 / Settings().rate
 

@@ -19,7 +19,7 @@ from katana450.extensions.real_arm.emulator.axis import (
 )
 from katana450.extensions.real_arm.encoder_map import EncoderMap
 from katana450.extensions.real_arm.plant.axis import KATANA450, STEP, PlantProfile
-from katana450.extensions.real_arm.plant.driver import GravityLoads
+from katana450.extensions.real_arm.plant.loads import GravityLoads
 from katana450.maths.geometry.arrays import FloatArray
 
 SEARCH_SPEED, SLOW_SPEED = 6000.0, 1000.0

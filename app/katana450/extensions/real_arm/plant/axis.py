@@ -10,7 +10,6 @@ Source: Lynch & Park, Modern Robotics (2017), ch. 11.4 (control with torque inpu
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 
@@ -21,7 +20,6 @@ class PlantProfile:
     Lengths of sliding joints take the place of angles, in m instead of rad.
 
     Attributes:
-        name: name on the command line.
         bandwidth: natural frequency of the position control of an axis [rad/s].
         damping: its damping ratio.
         delay: time from a setpoint to the motion that it commands [s].
@@ -33,7 +31,6 @@ class PlantProfile:
         reserve: largest acceleration of the motor, as a multiple of the arm's own limit.
     """
 
-    name: str
     bandwidth: float
     damping: float
     delay: float
@@ -46,7 +43,6 @@ class PlantProfile:
 
 
 STIFF = PlantProfile(
-    "stiff",
     bandwidth=200.0,
     damping=1.0,
     delay=0.0,
@@ -60,7 +56,6 @@ STIFF = PlantProfile(
 """Axes that follow within 0.01 degrees: for tests of everything but the plant. Not measured."""
 
 KATANA450 = PlantProfile(
-    "katana450",
     # Assumed: a fourteenth of the rate of the internal bus, which has 100 cycles a second.
     bandwidth=45.0,
     # Assumed: no overshoot is reported by the people who ran such an arm.
@@ -83,8 +78,6 @@ KATANA450 = PlantProfile(
 )
 """The Katana450. Only the cycle of its bus and its precision are known; the rest is assumed until
 an arm is measured."""
-
-PROFILES: Mapping[str, PlantProfile] = {known.name: known for known in (STIFF, KATANA450)}
 
 STEP = 0.0025
 """[s] Length of a step."""
