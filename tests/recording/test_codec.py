@@ -21,11 +21,12 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import classes_of
 from katana450.arm.control.lease import SERVER, Actor, CommandChannel, Grounds, Person, Role
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.modes import Tracking
-from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.modes import Target, Tracking
+from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Shape
 from katana450.arm.control.state.solid import Solid
 from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.arm.control.state.stop_cause import pressed
+from katana450.arm.robot.props import load_props, water_environment
 from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import (
     Curve,
@@ -38,6 +39,7 @@ from katana450.extensions.programs.planning.curves import (
     TurnedCurve,
 )
 from katana450.extensions.recording.codec import Codec, form_of, key_of, recorded_classes
+from katana450.extensions.recording.former_forms import target_content
 from katana450.extensions.recording.forms import (
     MAX_TEXT_BYTES,
     FormError,
@@ -48,9 +50,12 @@ from katana450.extensions.recording.ticks import Digester
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import Plan, plan
 from katana450.maths.planning.scaling import Bounds
+from katana450.maths.water.flow import Course, MotionWithWater, VesselMotion, WaterFlow
+from katana450.maths.water.units import ML
 from katana450.settings import Settings
 from tests.conftest import LONG
 from tests.control.test_commands import KINDS, examples
@@ -118,6 +123,33 @@ def test_every_command_survives_to_the_bit(
         back = copied(cmd.Command, command)
         assert type(back) is type(command)
         assert text_of(back) == text_of(command), command
+
+
+def test_water_of_older_versions_is_read_and_other_liquids_are_refused() -> None:
+    """They wrote the liquid in the cup."""
+    fill = cmd.Fill(100.0)
+    form = Codec().encoded(fill)
+    liquid = ["water", 998.2, 0.0010016, 0.07274, [74, 148, 192]]
+    assert Codec().decoded(cmd.Command, {**form, "liquid": liquid}) == fill
+    honey = ["honey", 1421.0, 19.0, 0.055, [194, 116, 0]]
+    with pytest.raises(FormError, match="Fill has no field 'liquid'"):
+        Codec().decoded(cmd.Command, {**form, "liquid": honey})
+
+
+def test_water_of_versions_with_one_vessel_is_read() -> None:
+    """They wrote the cup's fields beside those of the basin."""
+    water = WaterFlow(water_environment(load_props())).begin(1e-4, np.eye(4))
+    poured = MotionWithWater(water, (VesselMotion(Course(), (0.0, 0.0, 0.1)),))
+    form = Codec().encoded(poured)
+    ((cup,), (motion,)) = form["water"].pop("vessels"), form.pop("motions")
+    old = form["water"] | {"cup": cup["volume"] - 7, "T_base_cup": cup["T"]}
+    old |= {"slosh": cup["slosh"], "film": 7, "wetted": 0.01}
+    decoded = Codec().decoded(MotionWithWater, {**form, **motion, "waited": 0.5, "water": old})
+    assert text_of(decoded) == text_of(poured)
+    forms: tuple[Any, ...] = ({}, {"water": 1}, {"water": {"cup": 1}}, {"course": {}})
+    for wrong in forms:
+        with pytest.raises(FormError):
+            Codec().decoded(MotionWithWater, wrong)
 
 
 def test_repeated_segment_is_one_object_again(follow: cmd.Follow) -> None:
@@ -315,12 +347,100 @@ def test_error_names_the_place_and_the_fault(text: bytes, expected: str) -> None
         Codec().decoded(cmd.Command, json_form(text))
 
 
-def test_drag_has_the_digest_of_its_targets(state: State) -> None:
-    five = ToolTarget(np.array((1.0, 2.0, 3.0)), pitch=0.1, roll=0.2)
+CAUSE = Finding(Reason.WAITING)
+CAUSE_FORM = {"reason": "WAITING", "amount": 0.0, "axis": None, "parts": None, "time": 0.0}
+PAINT = {"is": "set_appearance", "name": "cup", "trait": "CHOICE", "value": -1}
+SAMPLE = {"is": "Servo", "q": [0.1, 0.2], "qd": None, "gripper": None}
+
+
+@pytest.mark.parametrize(
+    ("form", "expected"),
+    [
+        ({"is": "SetJoint", "axis": 0, "value": 0.5}, cmd.Joint(1, 0.5)),
+        ({"is": "Nudge", "axis": 4, "by": 0.5}, cmd.Nudge(5, 0.5)),
+        ({"is": "SetAxes", "values": [[0, 0.5], [2, 1.5]]}, cmd.SetAxes(((1, 0.5), (3, 1.5)))),
+        ({"is": "MoveTool", "position": [0.1, 0.2, 0.3]}, cmd.Position(np.array((0.1, 0.2, 0.3)))),
+        ({"is": "TakeBranch", "branch": "left-up"}, cmd.Branch(name="left-up")),
+        (
+            {"is": "TakeBranch", "branch": {"shoulder": "back", "elbow": "up"}},
+            cmd.Branch(name="back-up"),
+        ),
+        ({"is": "SpeedScale", "value": 0.5}, cmd.Speed(0.5)),
+        ({"is": "attach", "name": "cup", "to": "TABLE"}, cmd.Attach("cup", Attachment.WORLD)),
+        ({"is": "offer_detour", "plan": "0123"}, cmd.Batch(())),
+        ({**PAINT, "is": "SetAppearance"}, cmd.Batch(())),
+        ({"is": "batch", "commands": [PAINT, {"is": "home"}]}, cmd.Batch((cmd.Home(),))),
+        ({"is": "Fill", "volume": ML * 100.0}, cmd.Fill(100.0)),
+        ({"is": "Hold", "finding": None}, cmd.Hold()),
+        ({"is": "Pause", "finding": CAUSE_FORM}, cmd.PauseFor(CAUSE)),
+        ({**SAMPLE, "t": None}, cmd.Servo(np.array((0.1, 0.2)))),
+        ({**SAMPLE, "t": 0.3}, cmd.Servo(np.array((0.1, 0.2))).timed(0.3)),
+        (
+            {"is": "Batch", "commands": [{"is": "SetTool", "name": "tcp"}, {"is": "Home"}]},
+            cmd.Batch((cmd.Tool("tcp"), cmd.Home())),
+        ),
+    ],
+    ids=lambda value: value["is"] if isinstance(value, dict) else "",
+)
+def test_commands_of_older_versions_are_read(form: dict[str, Any], expected: cmd.Command) -> None:
+    command = Codec().decoded(cmd.Command, form)
+    assert text_of(command) == text_of(expected)
+
+
+def test_state_of_a_version_that_painted_links_is_read_and_has_its_digest(state: State) -> None:
+    painted = Codec().encoded(state) | {"appearance": {"changed": [["cup", {"choice": "HIDDEN"}]]}}
+    assert text_of(Codec().decoded(State, painted)) == text_of(state)
+    assert b"\x81\xa7changed\x90" in Digester().content(state)
+
+
+def test_detour_of_an_older_version_is_read_as_a_plan_that_is_followed() -> None:
+    writer, reader = Codec(), Codec()
+    offer = {"is": "offer_detour", "plan": writer.encoded(SESSIONS["follow"])["plan"]}
+    for shared in writer.shared.take_new():
+        reader.shared.add(shared)
+    reader.decoded(cmd.Command, offer)
+    command = reader.decoded(cmd.Command, {"is": "go"})
+    np.testing.assert_array_equal(command.plan.end, SESSIONS["follow"].plan.end)
+
+
+def test_target_of_an_older_version_is_read_and_has_its_digest(state: State) -> None:
+    """Poses were a class of their own, and targets of five axes had no rotation."""
+    form = {"is": "ToolPose", "position": [0.1, 0.2, 0.3], "R": np.eye(3).tolist()}
+    pose = Codec().decoded(Target, form)
+    np.testing.assert_array_equal(pose.T[:3], np.column_stack((np.eye(3), (0.1, 0.2, 0.3))))
+    assert target_content(pose) == ("ToolPose", {"position": pose.position, "R": pose.R})
+    rows = [{"position": [x, 0.0, 0.3], "R": np.eye(3).tolist()} for x in (0.1, 0.2, 0.3)]
+    lines = Codec().decoded(Curve, {"is": "PoseLines", "vias": rows, "blend": [0.5]})
+    assert lines.at(Jet.variable(1.0)).target.apart(lines.vias[-1]) == (0.0, 0.0)
+    five = Codec().decoded(
+        Target, {"is": "ToolTarget", "position": [1, 2, 3], "pitch": 0.1, "roll": 0.2}
+    )
     content = {"position": five.position, "pitch": 0.1, "roll": 0.2}
+    assert target_content(five) == ("ToolTarget", content)
     drag = replace(state, mode=Tracking(five, five))
-    text = msgpack.encode({"target": content}, enc_hook=lambda value: value.tobytes())
-    assert text[1:] in Digester().content(drag)
+    former = msgpack.encode({"target": content}, enc_hook=lambda value: value.tobytes())
+    assert former[1:] in Digester().content(drag)
+
+
+@given(st.floats(0.0, 300.0))
+def test_volume_of_an_older_version_stays_the_same_to_the_bit(ml: float) -> None:
+    volume = ML * ml
+    assert Codec().decoded(cmd.Command, {"is": "Fill", "volume": volume}).volume == volume
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        {"is": "SetJoint", "axis": "0", "value": 0.5},
+        {"is": "SetAxes", "values": [["0", 0.5], 3]},
+        {"is": "TakeBranch", "branch": {"shoulder": "left"}},
+        {"is": "Fill", "volume": "1"},
+        {"is": "Hold", "finding": 3},
+    ],
+)
+def test_wrong_command_of_an_older_version_is_refused(form: dict[str, Any]) -> None:
+    with pytest.raises(FormError):
+        Codec().decoded(cmd.Command, form)
 
 
 def test_deep_batches_and_long_texts_are_refused() -> None:

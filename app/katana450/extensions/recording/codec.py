@@ -41,6 +41,7 @@ from katana450.extensions.programs.planning.curves import (
     TurnedCurve,
 )
 from katana450.extensions.programs.steps.trajectory import TrajectoryPath
+from katana450.extensions.recording.former_forms import CLASSES, FORMER, command_form, upgraded
 from katana450.extensions.recording.forms import (
     MAX_INT,
     MAX_ITEMS,
@@ -86,6 +87,8 @@ class SharedValues:
         self._texts: dict[str, SharedText] = {}
         self._values: dict[str, Any] = {}
         self._new: list[SharedText] = []
+        self.detours: list[Any] = []
+        """Keys of the detours that states and commands of an older version offer."""
 
     def key(self, value: Any, text: Callable[[Any], bytes]) -> str:
         """Return the key of ``value``. ``text`` returns the form of a value that is not known."""
@@ -329,13 +332,19 @@ def _union(parts: Iterable[Any]) -> TextForm:
     if len(records) > 1:
         for record in records.values():
             record.tagged = True
+    commands = any(issubclass(record.kind, Act) for record in records.values())
 
     def decode(form: Any, shared: SharedValues) -> Any:
         if form is None and optional:
             return None
         if len(records) > 1 and isinstance(form, dict):
+            form = command_form(form, shared.detours) if commands else form
             name = form.get(TAG)
-            record = records.get(name) if isinstance(name, str) else None
+            # Before a field had several types, its objects had no tag.
+            fit = [record for record in records.values() if record.has_form_of(form)]
+            record = records.get(CLASSES.get(name, name)) if isinstance(name, str) else None
+            if name is None and len(fit) == 1:
+                record = fit[0]
             if record is None:
                 raise FormError(f"{shown(name)} is not one of {', '.join(records)}")
             return record.decode(form, shared)
@@ -374,6 +383,10 @@ class _Record:
         hints = typing.get_type_hints(self.kind)
         return {name: form_of(hints[name]) for name in self._names}
 
+    def has_form_of(self, form: Mapping[str, Any]) -> bool:
+        """Return whether ``form`` has all fields that are required, and no others."""
+        return self._required <= form.keys() <= self.forms.keys()
+
     def decode(self, form: Any, shared: SharedValues) -> Any:
         """Return the value whose fields have the forms in the object ``form``."""
         name = self.kind.__name__
@@ -381,9 +394,10 @@ class _Record:
             raise FormError(f"{shown(form)} is not an object of {name}")
         order = form.get(ORDER) if self.kind is Plan else None
         forms: dict[str, Any] = {}
-        for field, content in form.items():
+        for field, content in upgraded(self.kind, form, shared.detours).items():
             if field not in self.forms:
-                if field == TAG or (field == ORDER and self.kind is Plan):
+                known = field == TAG or (field == ORDER and self.kind is Plan)
+                if known or FORMER.get(field) == content:
                     continue
                 raise FormError(f"{name} has no field {shown(field)}")
             try:

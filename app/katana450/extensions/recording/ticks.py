@@ -27,14 +27,7 @@ from katana450.arm.control.lease import Actor
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.stopping import with_name
 from katana450.arm.control.state.arm_report import ArmReport
-from katana450.arm.control.state.modes import (
-    Following,
-    Leaving,
-    Mode,
-    Positioning,
-    Target,
-    Tracking,
-)
+from katana450.arm.control.state.modes import Following, Leaving, Mode, Positioning, Tracking
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
 from katana450.arm.control.state.stop_cause import StopCause
@@ -42,10 +35,10 @@ from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.recording.codec import Codec
+from katana450.extensions.recording.former_forms import target_content
 from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.messages import GivenCommand, SentAnswer, TickMessage
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.tool import ToolTarget
 
 DIGEST_DIGITS = 10
 """Length of a digest. One of 10^10 states that differ has the same digest by chance. Decimal digits
@@ -118,16 +111,6 @@ def _mode(mode: Mode) -> tuple[Any, ...]:
             target, since = target_content(mode.target)[1], target_content(mode.since)[1]
             return name, {"target": target, "since": since, "let_go": mode.let_go}
     return name, mode
-
-
-def target_content(target: Target) -> tuple[str, Any]:
-    """Return the content of a target for a digest."""
-    if not isinstance(target, ToolTarget):
-        return type(target).__name__, target
-    if target.is_pitched:
-        position, pitch, roll = target.position, target.pitch, target.roll
-        return "ToolTarget", {"position": position, "pitch": pitch, "roll": roll}
-    return "ToolPose", {"position": target.position, "R": target.R}
 
 
 def without_identities(record: TickRecord) -> TickRecord:
