@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -169,7 +170,7 @@ class CollisionWorld:
 
     def at(self, x: FloatArray) -> PlacedWorld:
         """Return the world with all bodies placed at ``x`` (k,) [rad or m]."""
-        return PlacedWorld(self, self.linkage.poses(x))
+        return _placed(self, x.tobytes())
 
     def travel(self, placed: PlacedWorld, x: FloatArray, towards: FloatArray) -> FloatArray:
         """Return a bound on the relative motion (p,) [m] of the bodies of each pair.
@@ -356,3 +357,10 @@ class PlacedWorld:
         witness = engine.witness(self._placement, *bodies)
         one, other = (world.parts[world.part_of[body]].name for body in bodies)
         return Contact((one, other), witness.distance, witness.points, witness.normal)
+
+
+# A tick asks for the places where a step and a brake begin and end several times.
+@lru_cache(maxsize=16)
+def _placed(world: CollisionWorld, variables: bytes) -> PlacedWorld:
+    """Return ``world`` at the values of x that the bytes are."""
+    return PlacedWorld(world, world.linkage.poses(np.frombuffer(variables)))

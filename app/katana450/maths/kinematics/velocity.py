@@ -22,7 +22,7 @@ from katana450.maths.geometry import screws
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward, jacobian_body
+from katana450.maths.kinematics.forward import jacobian_body, tool_and_jacobian
 
 WELL_CONDITIONED: Final = 0.05
 """Singular value [1] from which on joint rates are not damped."""
@@ -237,10 +237,19 @@ def _freedoms(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray, Floa
     About these axes the arm can turn its tool: all three from six axes on, else those from the
     fourth on.
     """
-    J = jacobian_body(chain, q)
+    return _freedoms_at(chain, q.tobytes())
+
+
+# A tick asks for the same posture up to three times: where it begins, coasts to, and is judged.
+@lru_cache(maxsize=8)
+def _freedoms_at(chain: Chain, angles: bytes) -> tuple[FloatArray, FloatArray, FloatArray]:
+    T, J = tool_and_jacobian(chain, np.frombuffer(angles))
     J[3:] /= characteristic_length(chain)
     axes = np.eye(3) if chain.n >= ALL_FREEDOMS else J[:3, 3:].T
-    return np.concatenate((axes @ J[:3], J[3:])), forward(chain, q)[:3, :3], axes
+    freedoms = np.concatenate((axes @ J[:3], J[3:]))
+    for array in (freedoms, T, axes):
+        array.setflags(write=False)
+    return freedoms, T[:3, :3], axes
 
 
 def _damped(J: FloatArray, wanted: FloatArray) -> FloatArray:
