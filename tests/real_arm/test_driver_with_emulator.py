@@ -14,7 +14,8 @@ import pytest
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.real_arm.codec import requests
-from katana450.extensions.real_arm.driver.katana_driver import MAX_SILENCE, KatanaDriver
+from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
+from katana450.extensions.real_arm.driver_thread import MAX_SILENCE
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware
 from tests.conftest import LONG

@@ -6,12 +6,12 @@ It knows no connection, clock or thread: the caller performs the exchanges and n
 from __future__ import annotations
 
 import math
-from collections import deque
 
 import numpy as np
 
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode, ArmReport, MeasuredStop
 from katana450.arm.drivers.driver import DriverAnswer
+from katana450.extensions.real_arm.arm_modes import ArmModes
 from katana450.extensions.real_arm.codec.replies import (
     IN_MOTION,
     ArmReply,
@@ -66,15 +66,11 @@ CALIBRATION_ENDED = "STOP ended the calibration. Calibrate the arm again."
 
 MOVED_BY_ITSELF = "STOP froze the arm, which moved by itself. Calibrate the arm."
 
-FIRST_NOTE = "No connection. Connect to the arm to read it."
 
-
-class ArmMachine:
+class ArmMachine(ArmModes):
     """State machine of one arm.
 
     Attributes:
-        mode: Mode of the arm.
-        note: Sentence for people about the mode.
         arm: Newest measurements.
     """
 
@@ -91,13 +87,12 @@ class ArmMachine:
             joints: (6,) values of them that are reported before the first measurement [rad].
             travel: Travel of the tool between two postures; None if a stop is measured without it.
         """
-        self.mode, self.note = ArmMode.DISCONNECTED, FIRST_NOTE
+        super().__init__()
         self.arm = ArmReadings()
         self._encoders = EncoderMap()
         self._bounds, self._travel = bounds, travel
         self._joints = frozen(joints)
         self._motion = ArmMotion(self._encoders, self.arm)
-        self._acts: deque[ArmAct] = deque()
         self._procedure: Procedure | None = None
         self._step: ArmRequest | None = None
         self._resume_at = -np.inf
@@ -106,14 +101,8 @@ class ArmMachine:
         self._polled: dict[type[ArmRequest], float] = {}
         self._refusals = 0
         self._has_sensors = True
-        self._round_trip = 0.0
         self._measured_stop: MeasuredStop | None = None
-        self._wants_link = self._was_connected = self._must_freeze = False
-
-    @property
-    def wants_link(self) -> bool:
-        """True if there is to be a connection."""
-        return self._wants_link
+        self._must_freeze = False
 
     @property
     def moves(self) -> bool:
@@ -122,7 +111,7 @@ class ArmMachine:
 
     @property
     def version(self) -> tuple[object, ...]:
-        """Value that differs if the answer may differ."""
+        """Mode, note and measurements."""
         arm = self.arm
         return self.mode, self.note, arm.t, arm.states_t, arm.sensors, self._measured_stop
 
@@ -137,30 +126,10 @@ class ArmMachine:
         self._procedure = identify(self.arm, sentence)
         self._resume_at = -np.inf
 
-    def lost(self, problem: str) -> None:
-        """Note that the connection is lost, or that an attempt to connect failed.
-
-        Only an arm that has answered before is connected to again without an act of a person.
-        """
-        if self._was_connected:
-            self.mode = ArmMode.LOST
-            self.note = f"{problem} The arm may still move. Trying to connect again."
-        elif self._wants_link:
-            self._wants_link, self.note = False, problem
-        self._clear()
-
     def perform(self, act: ArmAct) -> None:
         """Begin ``act`` as soon as possible; drop one that is impossible in the present mode."""
-        if act not in self.mode.acts:
-            return
-        if act is ArmAct.CONNECT:
-            self._wants_link, self.note = True, "Connecting to the arm."
-        elif act is ArmAct.DISCONNECT:
-            self.mode, self.note = ArmMode.DISCONNECTED, FIRST_NOTE
-            self._wants_link = self._was_connected = self._must_freeze = False
-            self._clear()
-        else:
-            self._acts.append(act)
+        super().perform(act)
+        self._must_freeze = self._must_freeze and self.wants_link
 
     def steer(self, joints: FloatArray, t: float, *, stopped: bool) -> None:
         """Take a setpoint (6,) [rad] of time ``t`` [s], or the order to stop the arm."""
@@ -186,12 +155,12 @@ class ArmMachine:
         An arm whose calibration ends is not calibrated. An arm that does not answer may still
         calibrate, so it is frozen as soon as it answers again.
         """
-        self._acts.clear()
+        super().end_act(now)
         if self.mode is ArmMode.CALIBRATING and self._procedure is not None:
             self._procedure.close()
             axes = DRIVEN
             self._start(halt(self.arm, axes, self._encoders, now, CALIBRATION_ENDED), now)
-        elif self._wants_link and not self.mode.follows:
+        elif self.wants_link and not self.mode.follows:
             self._must_freeze = True
 
     def freeze(self, now: float) -> None:
@@ -201,7 +170,7 @@ class ArmMachine:
     def replied(self, request: ArmRequest, reply: ArmReply, sent: float, now: float) -> None:
         """Take the reply to ``request``, which was sent at ``sent`` [s] and came at ``now`` [s]."""
         middle = 0.5 * (sent + now)
-        self._round_trip = now - sent
+        self.round_trip = now - sent
         self.arm.note(reply, middle)
         self._refusals = 0
         self._note_answer()
@@ -291,7 +260,7 @@ class ArmMachine:
             expected,
             frozen(speeds),
             self.note,
-            self._round_trip,
+            self.round_trip,
             tuple(map(float, self.arm.sensors)),
             self._measured_stop,
         )
@@ -305,12 +274,11 @@ class ArmMachine:
     # Transitions.
 
     def _clear(self) -> None:
-        """Drop all that was to be sent: nothing of it may happen on another connection."""
         if self._procedure is not None:
             self._procedure.close()
         self._procedure = self._step = self._stop_asked = None
         self._motion.clear()
-        self._acts.clear()
+        self.acts.clear()
         self._polled.clear()
 
     def _begin(self, now: float) -> None:
@@ -326,8 +294,8 @@ class ArmMachine:
             if self.mode.follows and self._motion.moves(now):
                 self._halt(press)
             return
-        while self._acts and self._procedure is None:
-            act = self._acts.popleft()
+        while self.acts and self._procedure is None:
+            act = self.acts.popleft()
             if act not in self.mode.acts:
                 continue
             self._measured_stop = None
