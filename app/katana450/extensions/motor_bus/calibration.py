@@ -12,8 +12,14 @@ from msgspec import Meta
 from katana450.errors import InputError
 from katana450.extensions.motor_bus.packets import MAX_ID, TURN
 
+AXES = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
+"""Names of the motors of the joints of an SO-101 in its calibration, and in its description."""
+
 GRIPPER = "gripper"
-"""Name of the motor of the jaw of an SO-101."""
+"""Name of the motor of its jaw, and of the joint of that."""
+
+MOTORS = (*AXES, GRIPPER)
+"""Names of all motors."""
 
 MAX_BYTES = 64_000
 """Maximum size of a calibration file."""

@@ -6,6 +6,7 @@ or the error flags of a motor. Source: the memory table and protocol of Feetech'
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
@@ -37,6 +38,8 @@ class Instruction(IntEnum):
     WRITE = 0x03
     SYNC_READ = 0x82
     """Read the same registers of several motors, which answer one after the other."""
+    SYNC_WRITE = 0x83
+    """Set the same register of several motors, which do not answer."""
 
 
 class MotorError(IntFlag):
@@ -84,15 +87,33 @@ class Register(NamedTuple):
         return -(value & ((1 << self.sign_bit) - 1))
 
 
+MODEL, ID, BAUD = Register(3, 2), Register(5, 1), Register(6, 1)
+"""Kept without power, like all up to the mode. A motor whose LOCK is 1 forgets what is written."""
+
 MIN_POSITION, MAX_POSITION = Register(9, 2, 15), Register(11, 2, 15)
 """[ticks] Range that a motor leaves for no goal. It keeps it without power."""
 
 HOMING_OFFSET = Register(31, 2, 11)
 """Actual minus reported position [ticks]. The motor keeps it without power."""
 
-TORQUE_ENABLE = Register(40, 1)
+TORQUE_ENABLE, ACCELERATION = Register(40, 1), Register(41, 1)
+GOAL_POSITION = Register(42, 2, 15)
+"""[ticks]"""
+TORQUE_LIMIT = Register(48, 2)
+"""[1/1000 of the largest torque]"""
+LOCK = Register(55, 1)
 PRESENT_POSITION = Register(56, 2, 15)
 """[ticks]"""
+PRESENT_SPEED = Register(58, 2, 15)
+"""[ticks/s]"""
+PRESENT_LOAD = Register(60, 2, 10)
+"""[1/1000 of the largest torque]"""
+PRESENT_VOLTAGE = Register(62, 1)
+"""[0.1 V]"""
+PRESENT_TEMPERATURE = Register(63, 1)
+"""[degrees C]"""
+STATUS = Register(65, 1)
+"""The MotorError of the motor, which each of its packets has too."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +161,13 @@ def write_request(motor: int, register: Register, value: int) -> Packet:
 def sync_read_request(motors: tuple[int, ...], address: int, size: int) -> Packet:
     """Return the request for ``size`` bytes from ``address`` on of all ``motors``."""
     return Packet(BROADCAST, Instruction.SYNC_READ, bytes((address, size, *motors)))
+
+
+def sync_write_request(register: Register, values: Mapping[int, int]) -> Packet:
+    """Return the request that sets ``register`` to the ``values`` by the ids of the motors."""
+    rows = (bytes((motor,)) + register.encoded(value) for motor, value in values.items())
+    head = bytes((register.address, register.size))
+    return Packet(BROADCAST, Instruction.SYNC_WRITE, head + b"".join(rows))
 
 
 class PacketReader:
