@@ -6,6 +6,7 @@ Nothing heavy is loaded before it is used.
 from __future__ import annotations
 
 import argparse
+import re
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,11 +35,16 @@ WIDEST_OBJECT = 120.0
 def add_emulate_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 emulate`` to ``parser``."""
     parser.description = (
-        "Emulate the firmware of a Katana450 behind a TCP port, with simulated motors. It begins "
-        "as an arm after power-up: not calibrated, with its motors off."
+        "Emulate the firmware of a Katana450 behind a TCP port, or the motors of an SO-101 behind "
+        "a TCP port and a pseudo-terminal. It begins as an arm after power-up: a Katana450 is not "
+        "calibrated, and motors are off."
     )
     parser.add_argument(
-        "--port", type=port, default=PORT, help="0 for any free port (default: %(default)s)"
+        "emulated", nargs="?", choices=("katana450", "so101"), default="katana450", help="the arm"
+    )
+    parser.add_argument("--port", type=port, help=f"0 for any free port (default: {PORT} or 5567)")
+    parser.add_argument(
+        "--calibration", type=Path, metavar="FILE", help="so101: write its calibration there"
     )
     parser.add_argument(
         "--object",
@@ -81,6 +87,12 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         help=f"drive a real arm. {ADDRESS_HELP[0].upper()}{ADDRESS_HELP[1:]}. {STOP_BUTTON}",
     )
     parser.add_argument(
+        "--calibration",
+        type=Path,
+        metavar="FILE",
+        help="calibration of an SO-100 or SO-101 at --device, a JSON file of LeRobot",
+    )
+    parser.add_argument(
         "--arm-log", type=Path, metavar="FILE", help="write all exchanges with a Katana450 there"
     )
 
@@ -90,13 +102,20 @@ def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> D
 
     q: (n,) [rad] and gripper [rad] are reported before the first measurement. Raises KatanaError.
     """
-    if options.device is not None:
-        from katana450.extensions.real_arm.driver.katana_driver import driver_of
+    if options.device is None:
+        for name in ("arm_log", "calibration"):
+            if getattr(options, name) is not None:
+                option = "--" + name.replace("_", "-")
+                raise ConfigurationError(f"{option} needs a real arm: add --device ADDRESS.")
+        return None
+    name = re.sub("[^a-z0-9]|arm", "", (getattr(options, "arm", None) or "").lower())
+    if options.calibration is not None or name in ("so100", "so101"):
+        from katana450.extensions.real_arm.servo import driver as servo
 
-        return driver_of(options, robot, q, gripper)
-    if options.arm_log is not None:
-        raise ConfigurationError("--arm-log needs a real arm: add --device ADDRESS.")
-    return None
+        return servo.driver_of(options, robot, q, gripper)
+    from katana450.extensions.real_arm.driver import katana_driver
+
+    return katana_driver.driver_of(options, robot, q, gripper)
 
 
 def view_layer(options: Namespace) -> ViewLayer | None:

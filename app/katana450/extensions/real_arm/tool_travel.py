@@ -14,11 +14,9 @@ Travel = Callable[[FloatArray, FloatArray], float]
 """Returns the distance [m] between two postures, each (n + 1,) with the finger joint [rad]."""
 
 
-def tool_travel(robot: Robot) -> Travel | None:
-    """Return the function for the tool point of ``robot``; None for one without a tool."""
-    if robot.arm is None:
-        return None
-    chain = robot.arm.chain
+def tool_travel(robot: Robot) -> Travel:
+    """Return the function for the tool point of ``robot``."""
+    chain = robot.require_arm().chain
 
     def travel(start: FloatArray, end: FloatArray) -> float:
         a, b = (forward(chain, x[:-1])[:3, 3] for x in (start, end))
