@@ -18,11 +18,12 @@ from katana450.extensions.motor_bus.calibration import decoded_calibration, read
 from katana450.extensions.motor_bus.packets import (
     HOMING_OFFSET,
     PRESENT_POSITION,
+    TORQUE_ENABLE,
     MotorError,
     Packet,
 )
 from katana450.server.api import answers
-from tests.leader.emulated_leader import OFFSETS, RANGE, EmulatedMotors, calibration
+from tests.leader.emulated_leader import RANGE, EmulatedMotors, calibration
 
 LOWER = (-3.0, -2.1, -2.0, -2.0, -2.8)
 UPPER = (2.8, 0.1, 2.2, 1.8, 2.9)
@@ -163,8 +164,9 @@ def test_bus_reads_the_motors_through_noise() -> None:
     bus = MotorBus(port)
     # An adapter may return what was sent, and answers of other motors.
     port.noise = b"\x00\xff\xff" + Packet(9, 0, b"ab").encoded
-    assert [bus.read(motor, HOMING_OFFSET) for motor in range(1, 7)] == list(OFFSETS)
-    port.motors.angles = (0.1, -0.1, 0.2, -0.2, 1.0, -1.0)
+    offsets = [motor["homing_offset"] for motor in calibration().values()]
+    assert [bus.read(motor, HOMING_OFFSET) for motor in range(1, 7)] == offsets
+    port.motors.place((0.1, -0.1, 0.2, -0.2, 1.0, -1.0))
     positions = bus.read_all((1, 2, 3, 4, 5, 6), PRESENT_POSITION)
     assert positions[5] - positions[6] == pytest.approx(2.0 * 4096 / (2.0 * math.pi), abs=1.0)
     assert bus.errors(2) == MotorError(0)
@@ -172,7 +174,8 @@ def test_bus_reads_the_motors_through_noise() -> None:
 
 def test_silent_motors_are_named() -> None:
     port = WiredPort()
-    port.motors.silent = {2, 4}
+    for number in (2, 4):
+        port.motors.motors[number - 1].silent = True
     bus = MotorBus(port)
     with pytest.raises(SilentMotorError, match="do not answer: 2, 4"):
         bus.read_all((1, 2, 3, 4), PRESENT_POSITION)
@@ -185,7 +188,7 @@ def test_torque_is_switched_off_only_with_the_calibration_of_this_leader() -> No
     known = decoded_calibration(calibrated())
     prepare(MotorBus(port), known, (1, 2, 3, 4, 5, 6))
     assert not any(port.motors.torque)
-    port.motors.torque[2] = True
+    port.motors.motors[2][TORQUE_ENABLE] = 1
     other = decoded_calibration(calibrated(homing_offset=5))
     with pytest.raises(InputError, match="elbow_flex is 0 in the motor and 5 in the calibration"):
         prepare(MotorBus(port), other, (3,))

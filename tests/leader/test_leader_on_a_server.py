@@ -16,6 +16,7 @@ import pytest
 from katana450.client import Client, connect
 from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.motor_bus.calibration import decoded_calibration
+from katana450.extensions.motor_bus.packets import PRESENT_POSITION
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 from tests.waiting import until
@@ -43,8 +44,8 @@ class MovedLeader(EmulatedLeader):
     """A leader that rests at START, and moves as a sine from ``begin`` on."""
 
     def __init__(self) -> None:
-        super().__init__(self._angles)
         self.begun = math.inf
+        super().__init__(self._angles)
 
     def begin(self) -> None:
         self.begun = time.monotonic()
@@ -82,8 +83,8 @@ def posture(watcher: Client, tmp_path: Path, angles: tuple[float, ...]) -> np.nd
     calibration = decoded_calibration((tmp_path / "leader.json").read_bytes())
     joints = JointMap(calibration, watcher.query(answers.Arm))
     motors = EmulatedMotors()
-    motors.angles = angles
-    ticks = {motor: motors.position(motor) for motor in joints.motors}
+    motors.place(angles)
+    ticks = {motor: motors.motors[motor - 1][PRESENT_POSITION] for motor in joints.motors}
     return joints.posture(ticks).q
 
 
@@ -150,7 +151,7 @@ def test_lag_behind_a_sine(
         rows: list[tuple[float, float, list[float]]] = []
         for state in watcher.states(50.0):
             now = time.monotonic()
-            rows.append((now, leader.motion(now)[0], state.setpoint))
+            rows.append((now, leader.motors.motion(now)[0], state.setpoint))
             if now > leader.begun + 12.0:
                 break
         shown.process.send_signal(signal.SIGINT)

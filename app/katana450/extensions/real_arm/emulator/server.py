@@ -1,20 +1,27 @@
-"""``katana450 emulate``: the emulated arm behind a TCP port, in real time."""
+"""``katana450 emulate``: an emulated arm behind a TCP port or a terminal, in real time."""
 
 from __future__ import annotations
 
+import os
 import select
 import signal
 import socket
 import threading
 import time
 from argparse import Namespace
+from collections.abc import Iterable
 from contextlib import suppress
+from typing import Generic, TypeVar
 
 from katana450.arm.robot.loader import load
 from katana450.assembly.log_output import say
+from katana450.atomic import write_files, writer_of
+from katana450.extensions.motor_bus.bus import PORT as BUS_PORT
 from katana450.extensions.real_arm.codec.codecs import FirmwareCodec
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm, loads_of_robot
 from katana450.extensions.real_arm.emulator.firmware import Firmware
+from katana450.extensions.real_arm.link import PORT
+from katana450.extensions.real_arm.servo.emulated_servos import EmulatedServos, calibration_text
 from katana450.platform_support import raise_priority, stop_signals
 from katana450.sdk import listen
 
@@ -36,7 +43,10 @@ SEND_TIMEOUT = 1.0
 """[s] Time after which a client that reads no replies is dropped."""
 
 
-class EmulatorServer:
+ArmT = TypeVar("ArmT", EmulatedArm, EmulatedServos)
+
+
+class DeviceServer(Generic[ArmT]):
     """Serves one client at a time; the others wait for their turn, as far as the system lets them.
 
     A reply is sent by one write. The arm keeps moving when the connection is lost.
@@ -45,21 +55,31 @@ class EmulatorServer:
         arm: the arm; see ``lock``.
         lock: to be held by other threads while they use the arm.
         port: port on which it listens.
+        terminal: name of a pseudo-terminal that leads to the arm too; empty without one.
     """
 
-    def __init__(self, arm: EmulatedArm, port: int = 0) -> None:
+    has_terminal = False
+
+    def __init__(self, arm: ArmT, port: int = 0) -> None:
         """Open ``port``, 0 for any free one, for ``arm``. Raises ConfigurationError if taken."""
-        self.arm = arm
+        self.arm: ArmT = arm
         self.lock = threading.Lock()
-        self._firmware = Firmware(arm)
         self._listening = listen(HOST, port)
         self._listening.setblocking(False)
         self.port: int = self._listening.getsockname()[1]
         self._client: socket.socket | None = None
-        self._codec = FirmwareCodec()
+        self._ends = os.openpty() if self.has_terminal and hasattr(os, "openpty") else ()
+        self.terminal = os.ttyname(self._ends[1]) if self._ends else ""
+        if self._ends:
+            # A program that reads nothing loses replies, and does not hold the arm up.
+            os.set_blocking(self._ends[0], False)
         self._ending = threading.Event()
         self._now = time.monotonic()
         self._thread = threading.Thread(target=self.run, name="emulator", daemon=True)
+
+    def _replies(self, data: bytes) -> Iterable[bytes]:
+        """Return the replies to the requests that ``data`` completes."""
+        raise NotImplementedError
 
     def start(self) -> None:
         """Serve in a thread of its own."""
@@ -85,14 +105,20 @@ class EmulatorServer:
         finally:
             self._drop()
             self._listening.close()
+            for end in self._ends:
+                os.close(end)
 
     def _turn(self) -> None:
         client = self._client
         waited = self._listening if client is None else client
-        readable, _, _ = select.select([waited], [], [], IDLE)
+        readable, _, _ = select.select([waited, *self._ends[:1]], [], [], IDLE)
         with self.lock:
             self._advance()
-            if readable and client is self._client:
+            if self._ends and self._ends[0] in readable:
+                with suppress(OSError):
+                    for reply in self._replies(os.read(self._ends[0], RECEIVED_BYTES)):
+                        os.write(self._ends[0], reply)
+            if waited in readable and client is self._client:
                 if client is None:
                     self._accept()
                 else:
@@ -110,7 +136,7 @@ class EmulatorServer:
             client, _ = self._listening.accept()
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             client.settimeout(SEND_TIMEOUT)
-            self._client, self._codec = client, FirmwareCodec()
+            self._client = client
 
     def _receive(self, client: socket.socket) -> None:
         try:
@@ -120,8 +146,7 @@ class EmulatorServer:
         if not data:
             self._drop()
             return
-        for event in self._codec.receive(data):
-            reply = self._firmware.handle(event)
+        for reply in self._replies(data):
             if not self._send(client, reply):
                 return
 
@@ -140,6 +165,32 @@ class EmulatorServer:
             self._client = None
 
 
+class EmulatorServer(DeviceServer[EmulatedArm]):
+    """Serves an emulated Katana450."""
+
+    def __init__(self, arm: EmulatedArm, port: int = 0) -> None:
+        """Open ``port``, 0 for any free one, for ``arm``. Raises ConfigurationError if taken."""
+        super().__init__(arm, port)
+        self._firmware = Firmware(arm)
+        self._codec = FirmwareCodec()
+
+    def _accept(self) -> None:
+        self._codec = FirmwareCodec()
+        super()._accept()
+
+    def _replies(self, data: bytes) -> Iterable[bytes]:
+        return map(self._firmware.handle, self._codec.receive(data))
+
+
+class ServoServer(DeviceServer[EmulatedServos]):
+    """Serves the motors of an emulated SO-101, at a port and at a pseudo-terminal."""
+
+    has_terminal = True
+
+    def _replies(self, data: bytes) -> Iterable[bytes]:
+        return self.arm.replies(data)
+
+
 CHECK_INTERVAL = 1.0
 """[s] Interval at which the emulator is looked after."""
 
@@ -149,16 +200,23 @@ def emulate(options: Namespace) -> int:
     ending = threading.Event()
     for number in stop_signals():
         signal.signal(number, lambda *_: ending.set())
-    arm = EmulatedArm(
-        loads=loads_of_robot(load()),
-        calibrated=options.calibrated,
-        calibration_scale=options.calibration_scale,
-        object_width=options.object,
-    )
+    emulator: EmulatorServer | ServoServer
+    if options.emulated == "so101":
+        if options.calibration is not None:
+            write_files({options.calibration: writer_of(calibration_text())})
+        emulator = ServoServer(EmulatedServos(), BUS_PORT if options.port is None else options.port)
+    else:
+        arm = EmulatedArm(
+            loads=loads_of_robot(load()),
+            calibrated=options.calibrated,
+            calibration_scale=options.calibration_scale,
+            object_width=options.object,
+        )
+        emulator = EmulatorServer(arm, PORT if options.port is None else options.port)
     raise_priority()
-    emulator = EmulatorServer(arm, options.port)
     emulator.start()
-    say(f"Emulated arm: tcp://{HOST}:{emulator.port} (Ctrl-C stops)")
+    ways = " and ".join(filter(None, (f"tcp://{HOST}:{emulator.port}", emulator.terminal)))
+    say(f"Emulated arm: {ways} (Ctrl-C stops)")
     try:
         while not ending.wait(CHECK_INTERVAL) and emulator.is_running:
             pass
