@@ -1,0 +1,382 @@
+"""The driver of an SO-101 with the emulated motors on a real socket: motion, STOP, faults."""
+
+from __future__ import annotations
+
+import random
+import re
+import time
+from argparse import Namespace
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode
+from katana450.arm.robot.robot import Robot
+from katana450.client import connect as connect_client
+from katana450.errors import ConfigurationError, KatanaError
+from katana450.extensions.device_address import DeviceAddress
+from katana450.extensions.motor_bus import packets as reg
+from katana450.extensions.motor_bus.bus import MotorBus, open_port
+from katana450.extensions.motor_bus.packets import MotorError
+from katana450.extensions.real_arm.emulator.server import ServoServer
+from katana450.extensions.real_arm.options import driver
+from katana450.extensions.real_arm.servo.joints import ServoJoints
+from katana450.server.api import answers, requests
+from tests.browser.server import APP, AppServer
+from tests.conftest import LONG
+from tests.real_arm.control_loop import SmallLoop
+from tests.real_arm.emulated import emulator_process
+from tests.real_arm.emulated_so101 import (
+    PATIENCE,
+    calibration,
+    connect,
+    driven,
+    engage,
+    move,
+    served,
+    so101,
+    wait_until,
+)
+from tests.robot.public_arms import SO101, written
+
+ROUNDS = 50 if LONG else 1
+"""Faults of each kind."""
+
+IDS = tuple(range(1, 7))
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return so101(tmp_path_factory.mktemp("so101"))
+
+
+@pytest.fixture
+def server() -> Iterator[ServoServer]:
+    with served() as server:
+        yield server
+
+
+@pytest.fixture
+def loop(server: ServoServer, arm: Robot) -> Iterator[SmallLoop]:
+    with driven(server, arm) as loop:
+        yield loop
+
+
+def places(server: ServoServer) -> list[float]:
+    with server.lock:
+        return [motor.place for motor in server.arm.motors]
+
+
+def goals(server: ServoServer) -> list[int]:
+    with server.lock:
+        return [motor[reg.GOAL_POSITION] for motor in server.arm.motors]
+
+
+def torques(server: ServoServer) -> list[int]:
+    with server.lock:
+        return [motor[reg.TORQUE_ENABLE] for motor in server.arm.motors]
+
+
+def test_ticks_and_joints_are_inverse_and_the_middle_is_the_middle_of_the_joint(
+    arm: Robot,
+) -> None:
+    own = calibration()
+    joints = ServoJoints(own, arm)
+    middle = np.array([(motor.range_min + motor.range_max) // 2 for motor in own.values()])
+    jaw = 0.5 * (joints.lower[5] + joints.upper[5])
+    np.testing.assert_allclose(joints.joints(middle), [0.0] * 5 + [jaw], atol=1e-3)
+    for ticks in (middle + 100, middle - 333):
+        np.testing.assert_array_equal(joints.ticks(joints.joints(ticks)), ticks)
+    assert (joints.ticks(np.full(6, 9.0)) <= [m.range_max for m in own.values()]).all()
+    turned = {**own, "elbow_flex": msgspec.structs.replace(own["elbow_flex"], drive_mode=1)}
+    assert ServoJoints(turned, arm).scale[2] == -joints.scale[2]
+
+
+def test_another_arm_is_refused(robot: Robot) -> None:
+    with pytest.raises(ConfigurationError, match="is no SO-100 or SO-101"):
+        ServoJoints(calibration(), robot)
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_bus_scans_reads_writes_and_changes_ids(server: ServoServer, terminal: bool) -> None:
+    address = DeviceAddress("127.0.0.1", server.port)
+    if terminal:
+        pytest.importorskip("serial")
+        address = DeviceAddress(server.terminal, None)
+    bus = MotorBus(open_port(address, "the arm"))
+    try:
+        assert bus.scan(range(1, 9)) == IDS
+        assert set(bus.read_all(IDS, reg.MODEL).values()) == {777}
+        bus.write(6, reg.ID, 8)
+        assert bus.scan((6, 8)) == (8,)
+        bus.write_all(reg.GOAL_POSITION, {1: 2000, 3: 1500})
+        assert bus.read(1, reg.GOAL_POSITION) == 2000
+        assert bus.read(3, reg.GOAL_POSITION) == 1500
+        with server.lock:
+            server.arm.lost = 0.05
+        values = [bus.read(2, reg.TORQUE_LIMIT) for _ in range(30)]
+        assert set(values) == {1000}, "an answer that lost a byte is no answer"
+    finally:
+        bus.close()
+
+
+def test_arm_follows_its_setpoints_and_rests_at_them(server: ServoServer, loop: SmallLoop) -> None:
+    assert torques(server) == [0] * 6
+    engage(loop)
+    start = loop.measured
+    move(loop)
+    time.sleep(1.5)
+    target = loop.setpoint(time.perf_counter())
+    loop.setpoint = lambda _: target
+    wait_until(lambda: loop.report.mode is ArmMode.HOLDING, loop.report.note)
+    # A step of a motor is 0.09 degrees; the rest is the weight, which no motor holds exactly.
+    assert np.degrees(np.abs(loop.measured - target)).max() < 4.5
+    assert np.abs(loop.measured - start)[:5].max() > 0.1
+    report = loop.report
+    assert report.note == ""
+    # Loads, then voltages and temperatures.
+    assert report.sensors[6:] == (7.4,) * 6 + (30.0,) * 6
+
+
+def test_stop_holds_where_the_arm_is_and_release_alone_lets_it_fall(
+    server: ServoServer, loop: SmallLoop
+) -> None:
+    engage(loop)
+    move(loop, 0.8)
+    time.sleep(0.5)
+    loop.stop()
+    wait_until(lambda: loop.report.measured_stop is not None, "the stop is measured")
+    stop = loop.report.measured_stop
+    assert stop is not None
+    assert stop.distance is not None
+    assert stop.angle < 0.5
+    held = goals(server)
+    assert np.abs(np.subtract(held, places(server))).max() < 40
+    assert torques(server) == [1] * 6
+    for _ in range(3):
+        # Neither another stop nor another begin lets it sink.
+        loop.clear_stop()
+        time.sleep(0.1)
+        loop.stop()
+        time.sleep(0.1)
+    assert np.abs(np.subtract(held, goals(server))).max() < 30
+    loop.act(ArmAct.RELEASE, ArmMode.CONNECTED, PATIENCE)
+    assert torques(server) == [0] * 6
+    assert "off" in loop.report.note
+
+
+def test_stop_reaches_the_bus_soon(loop: SmallLoop) -> None:
+    """The goals of the motors are where the arm is; the machine may be busy meanwhile."""
+    engage(loop)
+    times = []
+    for _ in range(20 if LONG else 4):
+        move(loop, 0.6)
+        time.sleep(0.3)
+        pressed = time.perf_counter()
+        loop.stop()
+        wait_until(lambda: not loop.driver._machine._setpoints, "the stop is taken")  # type: ignore[attr-defined]
+        wait_until(lambda: not loop.driver._machine.hurries, "the stop is sent")  # type: ignore[attr-defined]
+        times.append(time.perf_counter() - pressed)
+        wait_until(lambda: loop.report.mode is ArmMode.HOLDING, "the arm rests")
+        loop.clear_stop()
+    print(f"STOP to the bus: median {1e3 * float(np.median(times)):.0f} ms, {max(times):.3f} s")
+    assert np.median(times) < 0.1
+
+
+def test_calibrate_is_left_to_lerobot(loop: SmallLoop) -> None:
+    connect(loop)
+    loop.driver.perform(ArmAct.CALIBRATE, 0.0)
+    wait_until(lambda: "lerobot-calibrate" in loop.report.note, "the note says how")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault of the motor ``number``, which the server gets and loses, and what is reported of it."""
+
+    name: str
+    words: str
+    mode: ArmMode = ArmMode.FAULT
+
+    def put(self, server: ServoServer, number: int, *, present: bool) -> None:
+        motor = server.arm.motors[number]
+        with server.lock:
+            match self.name:
+                case "silent":
+                    motor.silent = present
+                case "blocked":
+                    motor.blocked = present
+                    motor.fault = MotorError(0)
+                case "reset":
+                    motor[reg.TORQUE_ENABLE] = int(not present)
+                case "voltage":
+                    motor.volts = 4.2 if present else 7.4
+                    motor.fault = MotorError.VOLTAGE if present else MotorError(0)
+                case _:
+                    motor.fault = MotorError[self.name.upper()] if present else MotorError(0)
+
+
+FAULTS = (
+    Fault("overload", r"is overloaded and has reduced its force"),
+    Fault("overheat", r"is too hot.*30 °C"),
+    Fault("voltage", r"voltage.*4\.2 V"),
+    Fault("overcurrent", r"takes too much current"),
+    Fault("angle", r"fault of its sensor"),
+    Fault("silent", r"No answer of"),
+    Fault("reset", r"is limp: it was reset"),
+    Fault("blocked", r"Something blocks", ArmMode.COLLIDED),
+)
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_fault_stops_the_arm_where_it_is_with_a_true_sentence(
+    server: ServoServer, loop: SmallLoop, fault: Fault
+) -> None:
+    chance = random.Random(fault.name)
+    engage(loop)
+    for _ in range(ROUNDS):
+        number = chance.choice((1, 2) if fault.name == "blocked" else range(5))
+        move(loop, chance.uniform(0.2, 0.5))
+        time.sleep(chance.uniform(0.1, 0.5))
+        if fault.name == "blocked":
+            # It pushes against something that is a little before its goal.
+            target = loop.measured + np.where(np.arange(6) == number, np.radians(6.0), 0.0)
+            loop.setpoint = lambda _, target=target: target  # type: ignore[misc]
+        fault.put(server, number, present=True)
+        loop.wait(fault.mode, PATIENCE)
+        note = loop.report.note
+        assert re.search(fault.words, note), note
+        assert list(calibration())[number] in note
+        # As the session does for a report that does not follow.
+        loop.stop()
+        time.sleep(0.15)
+        held = goals(server)
+        time.sleep(0.15)
+        assert goals(server) == held, "nothing moves the goals after a fault"
+        others = [place for place in range(5) if place != number]
+        apart = np.abs(np.subtract(held, places(server)))[others]
+        assert apart.max() < 60, "the other motors hold the arm where it is"
+        assert [torques(server)[place] for place in others] == [1] * 4
+        fault.put(server, number, present=False)
+        loop.act(ArmAct.UNBLOCK, ArmMode.HOLDING, PATIENCE)
+        loop.clear_stop()
+
+
+@pytest.mark.parametrize("how", ["unplugged", "without power"])
+def test_lost_arm_is_reported_and_found_again(
+    server: ServoServer, loop: SmallLoop, how: str
+) -> None:
+    engage(loop)
+    move(loop)
+    with server.lock:
+        if how == "unplugged":
+            server._drop()
+        for motor in server.arm.motors:
+            motor.silent = True
+    loop.wait(ArmMode.LOST, PATIENCE)
+    loop.stop()
+    with server.lock:
+        for motor in server.arm.motors:
+            motor.silent = False
+    loop.wait(ArmMode.CONNECTED, PATIENCE)
+    assert "Connected again" in loop.report.note
+    held = goals(server)
+    time.sleep(0.2)
+    assert goals(server) == held, "nothing moves before a person engages the arm"
+    engage(loop)
+
+
+def test_bytes_that_are_lost_stop_nothing(server: ServoServer, loop: SmallLoop) -> None:
+    engage(loop)
+    with server.lock:
+        server.arm.lost = 0.02
+    move(loop)
+    time.sleep(2.0)
+    assert loop.report.mode.follows, loop.report.note
+
+
+def refused(loop: SmallLoop) -> str:
+    loop.driver.perform(ArmAct.CONNECT, 0.0)
+    first = loop.report.note
+    wait_until(lambda: loop.report.note not in (first, "Connecting to the arm."), "an answer")
+    assert loop.report.mode is ArmMode.DISCONNECTED
+    return loop.report.note
+
+
+def test_wrong_id_is_named(server: ServoServer, loop: SmallLoop) -> None:
+    with server.lock:
+        server.arm.motors[3][reg.ID] = 9
+    note = refused(loop)
+    assert "No answer of wrist_flex (id 4). A motor answers as id 9" in note
+
+
+def test_foreign_calibration_is_refused(server: ServoServer, arm: Robot) -> None:
+    own = calibration()
+    own["elbow_flex"] = msgspec.structs.replace(own["elbow_flex"], homing_offset=5)
+    with driven(server, arm, own=own) as loop:
+        assert "homing offset of elbow_flex is 0 in the motor and 5" in refused(loop)
+    assert torques(server) == [0] * 6
+
+
+def test_joint_far_beyond_its_limit_is_noticed(server: ServoServer, loop: SmallLoop) -> None:
+    with server.lock:
+        motor = server.arm.motors[1]
+        motor._ends, motor.place = (-2000, 4000), 500.0
+    connect(loop)
+    wait_until(lambda: "beyond its limit" in loop.report.note, loop.report.note)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"calibration": "c.json"}, "--calibration needs a real arm"),
+        ({"device": "tcp://h", "arm": "SO-101"}, "needs --calibration FILE"),
+        ({"device": "tcp://h", "arm": "so_arm100"}, "needs --calibration FILE"),
+        ({"device": "tcp://h", "calibration": "none.json"}, "cannot be read"),
+        ({"device": "h", "calibration": "c.json"}, "is not the address of a device"),
+    ],
+)
+def test_options_that_name_no_such_arm_are_refused(
+    arm: Robot, options: dict[str, str], message: str
+) -> None:
+    values: dict[str, object] = {"device": None, "arm": None, "calibration": None, "arm_log": None}
+    paths = {name: Path(value) for name, value in options.items() if name == "calibration"}
+    with pytest.raises(KatanaError, match=message):
+        driver(Namespace(**values | options | paths), arm, np.zeros(5), 0.0)
+
+
+@pytest.mark.long
+def test_server_drives_the_emulated_process_by_its_page_requests(tmp_path: Path) -> None:
+    urdf, file = written(tmp_path, "so101", SO101), tmp_path / "calibration.json"
+    with emulator_process("so101", "--calibration", str(file)) as (process, port):
+        device = ("--device", f"tcp://127.0.0.1:{port}", "--calibration", str(file))
+        with (
+            AppServer((*APP, "--urdf", str(urdf), *device)) as server,
+            connect_client(server.url, "Ada") as client,
+        ):
+
+            def arm() -> answers.MeasuredArm:
+                report = client.query(answers.State).arm
+                assert report is not None
+                return report
+
+            client.ask(requests.OperateArm(act=ArmAct.CONNECT))
+            wait_until(lambda: arm().mode == "connected", "connected")
+            client.ask(requests.OperateArm(act=ArmAct.ENGAGE, confirmed=True))
+            wait_until(lambda: arm().mode == "holding", "holding")
+            time.sleep(1.1)
+            client.clear_stop()
+            start = np.array(client.query(answers.State).q)
+            target = start + np.array((0.6, 0.5, -0.5, -0.4, 0.3))
+            client.ask(requests.Joints(q=target))
+            wait_until(
+                lambda: np.abs(np.array(client.query(answers.State).q) - target).max() < 0.08,
+                "the arm is where it was sent",
+            )
+            assert client.query(answers.State).stopped is None
+            process.kill()
+            wait_until(lambda: arm().mode == "lost", "lost")
+            assert client.query(answers.State).stopped is not None
