@@ -22,7 +22,6 @@ class PlantProfile:
     Attributes:
         bandwidth: natural frequency of the position control of an axis [rad/s].
         damping: its damping ratio.
-        delay: time from a setpoint to the motion that it commands [s].
         coulomb: Coulomb friction as an acceleration [rad/s^2].
         viscous: viscous friction as an acceleration per speed [1/s].
         droop: angle by which an axis hangs below its setpoint under its largest weight [rad].
@@ -33,7 +32,6 @@ class PlantProfile:
 
     bandwidth: float
     damping: float
-    delay: float
     coulomb: float
     viscous: float
     droop: float
@@ -45,7 +43,6 @@ class PlantProfile:
 STIFF = PlantProfile(
     bandwidth=200.0,
     damping=1.0,
-    delay=0.0,
     coulomb=1e-3,
     viscous=0.0,
     droop=0.0,
@@ -60,8 +57,6 @@ KATANA450 = PlantProfile(
     bandwidth=45.0,
     # Assumed: no overshoot is reported by the people who ran such an arm.
     damping=1.0,
-    # Two cycles of the internal bus of 10 ms: one to receive, one to act.
-    delay=0.02,
     # Assumed: with the bandwidth it leaves an axis within 0.014 degrees of its setpoint, so that
     # the tool is within the 0.1 mm that the maker quotes for the precision.
     coulomb=0.5,

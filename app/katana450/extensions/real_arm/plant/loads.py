@@ -16,21 +16,16 @@ NEGLIGIBLE = 0.01
 
 
 class GravityLoads:
-    """The weights on the axes of a robot, from the masses in its description.
-
-    All are zero for a robot without masses or without an arm.
-    """
+    """The weights on the axes of an arm, from the masses in its description, or else zero."""
 
     def __init__(self, robot: Robot) -> None:
         """Find the largest torque of each axis, from the stretched posture."""
-        self._arm = robot.arm
-        self._masses = loads_of(robot)
-        count = len(robot.driven) if robot.arm is None else robot.arm.chain.n
-        self._weights = (0.0,) * count
+        self._chain, self._masses = robot.require_arm().chain, loads_of(robot)
+        self._weights = (0.0,) * self._chain.n
         self._at: FloatArray | None = None
-        self._scale = np.zeros(count)
-        if robot.arm is not None and self._masses:
-            largest = np.abs(holding_torques(robot.arm.chain, np.zeros(count), self._masses))
+        self._scale = np.zeros(self._chain.n)
+        if self._masses:
+            largest = np.abs(holding_torques(self._chain, self._scale, self._masses))
             # An axis that is balanced when stretched holds no weight worth simulating.
             heavy = largest > NEGLIGIBLE
             self._scale[heavy] = 1.0 / largest[heavy]
@@ -40,10 +35,10 @@ class GravityLoads:
 
         It is positive if the motor must push towards larger angles to hold the arm.
         """
-        if self._arm is None or not self._scale.any():
+        if not self._scale.any():
             return self._weights
         if self._at is None or np.abs(q - self._at).max() > COARSE:
             self._at = q.copy()
-            torques = holding_torques(self._arm.chain, q, self._masses) * self._scale
+            torques = holding_torques(self._chain, q, self._masses) * self._scale
             self._weights = tuple(np.clip(torques, -1.0, 1.0).tolist())
         return self._weights
