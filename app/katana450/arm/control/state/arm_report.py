@@ -113,7 +113,7 @@ class ArmReport:
         speeds: (n + 1,) measured speeds [rad/s]; None if they are not measured.
         note: sentence for people about the mode; empty if there is nothing to say.
         round_trip: time of the newest exchange with the arm [s].
-        sensors: the raw values of the sensors of the gripper; empty without sensors.
+        sensors: raw values of the sensors of the arm; empty without sensors.
         measured_stop: the newest stop; None if there was none.
     """
 
