@@ -1,5 +1,6 @@
-// The axis of the timeline: recorded seconds, without the time in which the arm rested. The server
-// has the same functions in playback/spans.py.
+// The axis of the timeline: recorded seconds, without the time in which the arm rested. The server has the functions of
+// spans too, in files/spans.py.
+import { html } from "../instruments/shape.js";
 
 /** Length of the axis [s] of `spans`, each [begin, end] in seconds since the epoch. @param {import("./api.js").Span[]} spans */
 export const lengthOf = (spans) => spans.reduce((sum, [start, end]) => sum + end - start, 0);
@@ -21,4 +22,23 @@ export function placeOf(spans, t) {
     place += Math.min(t, end) - start;
   }
   return place;
+}
+
+/** Return the bars on the track: episodes, and what the run left when it was set back. @param {import("./api.js").Mark[]} marks @param {import("./api.js").Span[]} spans */
+export function bars(marks, spans) {
+  const length = lengthOf(spans) || 1;
+  /** @param {number} from @param {number} to @param {string} kind @param {string} title */
+  const bar = (from, to, kind, title) => {
+    const [begin, end] = [from, to].map((t) => (100 * placeOf(spans, t)) / length);
+    const shape = html("b", { class: kind, title });
+    shape.style.cssText = `left: ${begin}%; width: ${end - begin}%`;
+    return shape;
+  };
+  return marks.flatMap(([t, kind, words, since]) => {
+    if (since !== null) return [bar(since, t, "left", "Left: the run was set back to the start of this part")];
+    const [, name] = (kind === "episode" && /^(Episode \d+) begins/.exec(words)) || [];
+    if (!name) return [];
+    const [end] = marks.find(([, , other]) => other === `${name} ends`) ?? [Infinity];
+    return [bar(t, end, "episode", words)];
+  });
 }

@@ -4,8 +4,7 @@ import { html } from "../instruments/shape.js";
 import { addressed } from "../page/words.js";
 import { messageOf } from "../server.js";
 import * as api from "./api.js";
-import { atPlace, lengthOf, placeOf } from "./axis.js";
-import { bars } from "./bars.js";
+import { atPlace, bars, lengthOf, placeOf } from "./axis.js";
 import { Controls, option, timeInWords } from "./controls.js";
 import { NOTHING, Selection } from "./selection.js";
 
@@ -40,8 +39,6 @@ export class Timeline {
   #busy = false; // whether a moment is requested
   #timer = 0;
   #failed = false; // whether the last look at the recording failed
-  /** @type {((name: string) => Promise<void>) | undefined} */
-  #use; // what a chosen file is opened for
   #hidden = false; // whether the present is hidden
   #pinned = false; // whether the controls are shown without a pointer or focus on the line
   #news = 0; // looks at what was recorded that are due, because the status has changed
@@ -101,13 +98,13 @@ export class Timeline {
   }
 
   /** Open a file that was chosen or dropped. @param {File} file */
-  async replay(file, use = (/** @type {string} */ name) => this.#choose(name)) {
+  async replay(file) {
     this.#page.toast(`Opening ${file.name} …`);
     try {
       const { name, note } = await api.open(file);
       this.#names.set(name, file.name);
       this.#list();
-      await use(name);
+      await this.#choose(name);
       this.#page.toast(note || `${file.name} is open.`);
     } catch (error) {
       this.#page.toast(messageOf(error));
@@ -162,20 +159,17 @@ export class Timeline {
     now.addEventListener("keydown", (event) => this.#key(event));
     begin.addEventListener("input", () => this.#select(0, Number(begin.value)));
     end.addEventListener("input", () => this.#select(1, Number(end.value)));
-    of.addEventListener("change", () => (of.value === "file" ? this.#ask((name) => this.#choose(name)) : this.#choose(of.value)));
-    second.addEventListener("change", () => (second.value === "file" ? this.#ask((name) => this.#compare(name)) : this.#compare(second.value)));
-    onChoice(file, ([chosen]) => this.replay(chosen, this.#use));
+    of.addEventListener("change", () => {
+      if (of.value !== "file") return this.#choose(of.value);
+      this.#list();
+      file.click();
+    });
+    second.addEventListener("change", () => this.#compare(second.value));
+    onChoice(file, ([chosen]) => this.replay(chosen));
     // A finger opens the thin line first; a pointer is over it then, and the line has grown.
     this.#box.addEventListener("click", () => {
       if (!this.open && matchMedia("(hover: none)").matches) this.show(true, true);
     });
-  }
-
-  /** @param {(name: string) => Promise<void>} use */
-  #ask(use) {
-    this.#use = use;
-    this.#list();
-    this.#part.file.click();
   }
 
   /** @param {KeyboardEvent} event */
@@ -245,10 +239,10 @@ export class Timeline {
     const { of, second } = this.#part;
     const may = this.#page.store.status?.role !== "viewer";
     const opened = () => [...this.#names].filter(([name]) => name !== api.RING).map(([name, words]) => option(name, words));
-    const file = () => (may ? [option("file", "Open a file…")] : []);
-    of.replaceChildren(option(api.RING, this.#names.get(api.RING) ?? ""), ...opened(), ...file());
+    const file = may ? [option("file", "Open a file…")] : [];
+    of.replaceChildren(option(api.RING, this.#names.get(api.RING) ?? ""), ...opened(), ...file);
     of.value = this.#of;
-    second.replaceChildren(option("", "Compare…"), option("here", "from here on"), ...opened(), ...file());
+    second.replaceChildren(option("", "Compare…"), option("here", "from here on"), ...opened());
     second.value = this.#second ? (this.#names.has(this.#second.of) && this.#second.of !== this.#of ? this.#second.of : "here") : "";
   }
 
