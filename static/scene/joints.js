@@ -1,6 +1,6 @@
 // The joints in the picture: which link is under the pointer, its highlight, and the bar of the selected
 // one. A link that is dragged turns its joint; the pointer's events come from `stage.js`.
-import { element, sceneIn, write } from "../dom.js";
+import { element, repeating, sceneIn, write } from "../dom.js";
 import { button, html, signed } from "../instruments/shape.js";
 import { readState } from "../server.js";
 import { Glow, shapesOf } from "./glow.js";
@@ -32,7 +32,7 @@ export class Joints {
   /** @type {Drag | null} */
   #drag = null;
   #glow = new Glow();
-  #timer = 0;
+  #watch = repeating(() => document.hidden || this.#read(), READ);
   #label = html("p", { id: "joint-label", class: "scene-label", hidden: "" });
   #name = html("b");
   #angle = html("output");
@@ -180,15 +180,13 @@ export class Joints {
   /** Select a joint, whose bar is shown near a pixel; null for none. @param {number | null} joint @param {Page.Pixel} pixel */
   select(joint, pixel = [0, 0]) {
     this.#selected = joint;
-    clearInterval(this.#timer);
     this.#bar.hidden = joint === null;
     this.#light();
-    if (joint === null) return;
+    if (joint === null) return this.#watch(false);
     this.#angle.textContent = "";
     this.#show(joint);
     placeNear(this.#bar, this.#scene, pixel);
-    this.#read();
-    this.#timer = setInterval(() => document.hidden || this.#read(), READ);
+    this.#watch(true);
   }
 
   /** @param {number} joint */

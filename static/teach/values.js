@@ -4,12 +4,6 @@ import { button, clamp, html, set } from "../instruments/shape.js";
 
 /** @typedef {Omit<import("./blocks.js").Value, "line" | "column" | "end"> & { line?: number, column?: number, low?: number, high?: number }} Value */
 
-/** @param {Value} value */
-function inputOf({ options, free, step }) {
-  if (options && !free) return html("select", {}, ...options.map((word) => new Option(word)));
-  return html("input", step ? { type: "number", step } : { spellcheck: "false", autocomplete: "off", autocapitalize: "off" });
-}
-
 export class Values {
   element = html("div", { class: "values", role: "group" });
   #shape = ""; // which fields there are
@@ -42,9 +36,10 @@ export class Values {
   }
 
   /** @param {Value} value @param {number} i */
-  #add(value, i) {
-    const { name, options = [], free, step, low = -Infinity, high = Infinity } = value;
-    const [input, unit, why] = [inputOf(value), html("span"), html("em")];
+  #add({ name, options = [], free, step, low = -Infinity, high = Infinity }, i) {
+    const box = () => html("input", step ? { type: "number", step } : { spellcheck: "false", autocomplete: "off", autocapitalize: "off" });
+    const input = options.length && !free ? html("select", {}, ...options.map((word) => new Option(word))) : box();
+    const [unit, why] = [html("span"), html("em")];
     this.#fields[i] = { input, unit, why, text: "" };
     input.addEventListener("change", () => {
       const words = input.value.trim();
