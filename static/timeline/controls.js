@@ -1,5 +1,5 @@
 // The elements of the timeline: its track, its buttons and its lists.
-import { write } from "../dom.js";
+import { element, t, write } from "../dom.js";
 import { button, drawing, html, svg } from "../instruments/shape.js";
 import { clock } from "../page/words.js";
 
@@ -73,6 +73,9 @@ export class Controls {
     if (this.past.hidden !== shown) return;
     this.past.hidden = !shown;
     this.#note.replaceChildren(...(shown ? this.#words : []));
+    // Bar, instruments and viser's panel say that they show the present.
+    for (const { documentElement } of [document, element("scene", HTMLIFrameElement).contentDocument ?? document])
+      documentElement.style.setProperty("--now", shown ? JSON.stringify(t("Now")) : null);
   }
 
   /** Show whether the recording plays. @param {boolean} plays */

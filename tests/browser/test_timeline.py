@@ -218,6 +218,9 @@ def test_line_grows_under_the_pointer_and_plays_only_while_it_says_so(
     play.wait_for()
     page.page.keyboard.press("Home")
     page.wait_until(lambda: note.inner_text().startswith("Shown as it was at "), "the note")
+    said = "([at]) => getComputedStyle(document.querySelector(at), '::before').content"
+    assert page.page.evaluate(said, ["#headline span"]) == '"Now: "'
+    assert page.frame.evaluate(said, ["[data-scrollarea-viewport]"]) == '"Now"'
     play.click()
     page.wait_until(lambda: note.inner_text().startswith("Playing back "), "playing")
     line.get_by_label("Pause", exact=True).click()
