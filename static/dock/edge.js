@@ -1,8 +1,12 @@
-// The inner edge of the dock: it is dragged, or moved by the arrow keys, and a double click restores the first width.
+// The inner edge of the dock: it is dragged, or moved by the arrow keys. Where dock and panel leave the scene too little, the
+// panel is folded while the dock is open.
 import { element, styled } from "../dom.js";
+import { PANEL_FOLD } from "../viser/names.js";
 
 /** Movements to the right, px @type {Record<string, number>} */
 const STEPS = { ArrowLeft: -16, ArrowRight: 16 };
+const [LEAST, PANEL] = [560, 324]; // px, widths of the scene and of viser's panel
+const SETTLED = 200; // ms
 
 /** `name` is the one of the kept width. @param {Page.Context} page @param {string} name */
 export async function begin({ kept, scene }, name) {
@@ -34,11 +38,19 @@ export async function begin({ kept, scene }, name) {
     show(dock.offsetWidth, STEPS[event.key]);
   });
   for (const kind of ["lostpointercapture", "keyup", "blur"]) edge.addEventListener(kind, end);
-  edge.addEventListener("dblclick", () => {
-    kept.setItem(name, "");
-    dock.style.setProperty("--width", null);
+  const sized = new ResizeObserver(() => {
+    edge.setAttribute("aria-valuenow", ((100 * dock.offsetWidth) / desk.offsetWidth).toFixed());
+    const isNarrow = dock.offsetWidth > 0 && desk.offsetWidth - dock.offsetWidth < LEAST + PANEL;
+    const fold = scene.contentDocument?.querySelector(PANEL_FOLD);
+    if (!fold || isNarrow === desk.classList.contains("narrow")) return;
+    desk.classList.toggle("narrow", isNarrow);
+    // A person may have folded it, or unfolded it meanwhile.
+    if (fold.ariaExpanded !== String(isNarrow)) return;
+    const focused = /** @type {HTMLElement} */ (document.activeElement);
+    /** @type {HTMLElement} */ (fold).click();
+    // viser takes the focus.
+    setTimeout(() => focused.focus(), SETTLED);
   });
-  const sized = new ResizeObserver(() => edge.setAttribute("aria-valuenow", ((100 * dock.offsetWidth) / desk.offsetWidth).toFixed()));
   for (const part of [desk, dock]) sized.observe(part);
   await styled("edge.css", import.meta.url);
   edge.hidden = false;

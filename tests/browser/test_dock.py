@@ -85,9 +85,6 @@ def test_side_width_and_open_sheets_survive_a_reload(alone: Page) -> None:
         alone.locator(sheet).wait_for()
     assert box(alone, "#dock") == before
     assert before["width"] == pytest.approx(first - 28.0, abs=1.0)
-    edge(alone)
-    alone.locator("#dock-edge").dblclick()
-    assert width(alone) == first
     # What was closed stays closed.
     alone.click("#teach-button")
     alone.click("#jog-button")
@@ -163,6 +160,18 @@ def test_arm_is_whole_between_dock_and_panel(
     page.keep(artefacts / f"dock-{side}-{size[0]}.png")
     assert findings(window) == []
     assert page.errors == []
+
+
+def test_panel_is_folded_where_the_dock_leaves_too_little(
+    server: AppServer, open_page: OpenPage
+) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE), window=SMALL, own_camera=True)
+    page.page.click("#jog-button")
+    page.wait_until(lambda: canvas(page)["width"] >= 560.0, "room for the scene")
+    focused = "() => document.activeElement.id"
+    page.wait_until(lambda: page.page.evaluate(focused) == "jog-button", "the focus where it was")
+    page.page.click("#jog-button")
+    page.wait_until(lambda: canvas(page)["width"] == SMALL[0] - PANEL, "the panel again")
 
 
 def canvas(page: ViserPage) -> FloatRect:

@@ -342,6 +342,15 @@ def test_hint_belongs_to_the_row_of_its_control(page: ViserPage) -> None:
     page.wait_until(lambda: ask(page, shown) == 0, "no hint")
 
 
+def test_panel_of_a_wide_page_is_folded_and_unfolded(page: ViserPage) -> None:
+    expanded = "document.querySelector(Viser.PANEL_FOLD)?.ariaExpanded"
+    for state in ("true", "false"):
+        with part("PANEL_FOLD"):
+            page.wait_until(lambda state=state: ask(page, expanded) == state, state)  # type: ignore[misc]
+            ask(page, "document.querySelector(Viser.PANEL_FOLD).click()")
+    page.wait_until(lambda: ask(page, expanded) == "true", "the panel")
+
+
 @pytest.mark.long
 def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=NODES, window=PORTRAIT, script=script())

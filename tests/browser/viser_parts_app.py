@@ -27,6 +27,7 @@ def furnish(server: viser.ViserServer) -> None:
     scene.add_transform_controls("/hidden", position=(0.0, -0.4, 0.0), scale=0.3, visible=False)
     scene.add_label("/label", "A label", position=(0.0, 0.0, 0.5))
     gui.configure_theme(dark_mode=False)
+    gui.main_panel.dock_right()
     server.initial_camera.position = EYE
     server.initial_camera.look_at = TARGET
     slider = gui.add_slider("Height", min=-1.0, max=2.0, step=0.1, initial_value=0.0)
