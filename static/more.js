@@ -67,13 +67,11 @@ export function begin(context) {
   });
   onClick("snapshot", snapshot);
   onClick("robots-button", () => chooseRobot());
-  // In the bar, or in the menu for a finger.
-  for (const id of ["phone-bar", "phone-button"])
-    onClick(id, async () => {
-      dialog.close();
-      const { toggle } = await import("./more/phone.js");
-      toggle(toast);
-    });
+  onClick("phone-bar", async () => {
+    dialog.close();
+    const { toggle } = await import("./more/phone.js");
+    toggle(toast);
+  });
   page.store.follow(note);
 }
 

@@ -16,7 +16,6 @@ from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
 from tests.browser.session import Truth, bar
 from tests.browser.sight import contrast
-from tests.browser.sizes import PHONE, PORTRAIT
 from tests.browser.test_accessibility import findings
 from tests.browser.test_objects import drop
 from tests.exchange.shape_bytes import zipped
@@ -81,13 +80,12 @@ def test_code_of_a_server_of_one_machine_is_the_command_that_opens_it(own_page: 
 @pytest.mark.skipif(own_address() is None, reason="this machine is in no network")
 def test_code_on_the_screen_holds_the_address(open_page: OpenPage, artefacts: Path) -> None:
     with AppServer((*APP, "--host", "0.0.0.0", "--insecure")) as server:
-        page = open_page(server.url, drawing=Drawing.NONE, window=PORTRAIT, **PHONE)
+        page = open_page(server.url, drawing=Drawing.NONE)
         assert_code_holds_the_address(page, server, artefacts)
 
 
 def assert_code_holds_the_address(page: ViserPage, server: AppServer, artefacts: Path) -> None:
-    page.page.click("#more-button")
-    button = page.page.locator("#phone-button")
+    button = page.page.locator("#phone-bar")
     button.click()
     url = f"http://{own_address()}:{server.port}"
     address = page.page.get_by_label("Address for a phone")
