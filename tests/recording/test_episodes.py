@@ -30,9 +30,11 @@ from katana450.extensions.recording.episodes.episode_folder import (
     with_episode,
     write_episode,
 )
+from katana450.extensions.recording.episodes.keeper import EARLIER
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import verify_recording
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live import ring as ring_module
 from katana450.extensions.recording.messages import COMMANDS, EPISODES, STATE
 from katana450.server.api.episode_requests import episode_request
@@ -319,6 +321,9 @@ def test_crash_leaves_the_running_episode_unfinished(bench: Bench) -> None:
     assert second.episode.outcome is EpisodeOutcome.UNFINISHED
     assert second.episode.length > 0.5
     assert not bench.folder.markers()
+    assert bench.made().status()["notice"] == EARLIER
+    for path in recordings_in(bench.ring_folder):
+        os.utime(path, (0.0, 0.0))
     assert bench.made().status()["notice"] == ""
     bench.keeper = again
     again.handle(episode_request('{"do": "judge", "number": 2, "outcome": "failure"}'), ADA)

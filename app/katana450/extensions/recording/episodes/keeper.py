@@ -30,6 +30,7 @@ from katana450.extensions.recording.episodes.running_episode import (
     RunningEpisode,
     finish_interrupted,
 )
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live.ring import Ring
 from katana450.server.api.episode_requests import (
     DescribeEpisode,
@@ -45,6 +46,11 @@ from katana450.server.api.episode_requests import (
 )
 
 log = logging.getLogger(__name__)
+
+RECENT = 600.0
+"""[s] Maximum age of a recording that the notice is about; the ring holds ten minutes."""
+
+EARLIER = "What was recorded before the restart is still on the timeline, below the scene."
 
 
 class EpisodeKeeper:
@@ -75,7 +81,7 @@ class EpisodeKeeper:
         self._clock, self._utc_offset = clock, 1e-9 * int(run)
         self._requests = threading.Lock()
         self._changed = threading.Condition()
-        self._notice = ""
+        self._notice = EARLIER if _has_recent(ring_folder) else ""
         self._revision = 0
         self._running = RunningEpisode(folder, ring, ring_folder, run, self._note_change)
         interrupted, last = folder.markers(), folder.last()
@@ -311,3 +317,10 @@ class EpisodeKeeper:
             if self._running.runs(None):
                 self._stop(EpisodeOutcome.UNFINISHED, self._clock())
         self._folder.release()
+
+
+def _has_recent(folder: Path) -> bool:
+    """Return whether ``folder`` has a recording of a run that ended a short time ago."""
+    with suppress(OSError):
+        return any(time.time() - path.stat().st_mtime < RECENT for path in recordings_in(folder))
+    return False
