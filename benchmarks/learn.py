@@ -22,7 +22,8 @@ import gymnasium
 import katana450.learn  # noqa: F401  # registers our environments
 
 PEER, PEER_STEP = "Pusher-v5", 0.05
-OURS, STEP = ("katana450/PickPlace-v0", "katana450/Stack-v0", "katana450/Pour-v0"), 0.1
+OURS = tuple(f"katana450/{task}-v0" for task in ("PickPlace", "Stack", "Pour", "Drawer"))
+STEP = 0.1
 """Environments, and the time [s] that a step of them simulates."""
 
 TURNS = 5

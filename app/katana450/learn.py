@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from katana450 import extras
 
-MAX_STEPS = {"PickPlace": 300, "Stack": 300, "Pour": 400}
+MAX_STEPS = {"PickPlace": 300, "Stack": 300, "Pour": 400, "Drawer": 300}
 """Maximum number of steps of an episode of each task."""
 
 gymnasium = extras.library("gymnasium", "learn", "Environments")

@@ -23,6 +23,9 @@ while it is carried and as it is let go.
 
 OPEN, CLOSED = 1.0, -1.0
 
+HANDLE_MIDDLE = 0.035
+"""[m] Height of the tool over the lower edge of a handle as the fingers close."""
+
 
 class Policy:
     """The policy in one episode of an environment.
@@ -118,3 +121,23 @@ def pour(policy: Policy) -> None:
     for _ in range(60):
         if not policy.over:
             policy.turn(0.6, CLOSED)
+
+
+def pull(policy: Policy, pitch: float = 1.3) -> None:
+    """Grasp the handle of the drawer from above, pull it to its goal, and let go of it."""
+    up = np.array((0.0, 0.0, 1.0))
+    handle, goal = policy.place("handle"), policy.place("goal")
+    middle = handle + HANDLE_MIDDLE * up
+    for part, place, fingers, least, most in (
+        ("tool", middle + ABOVE * up, OPEN, 4, 60),
+        ("tool", middle, OPEN, 4, 40),
+        ("tool", middle, CLOSED, 16, 30),
+        ("handle", goal, CLOSED, 4, 60),
+    ):
+        for step in range(most):
+            if policy.over or (policy.move(part, place, fingers, pitch) and step >= least):
+                break
+    rest = policy.place("tool")
+    for _ in range(20):
+        if not policy.over:
+            policy.move("tool", rest, OPEN, pitch)

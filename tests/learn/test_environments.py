@@ -21,7 +21,7 @@ from katana450.extensions.learn.environment import (
     TaskEnvironment,
 )
 from tests.general_arms.test_published_hands import KINDS
-from tests.learn.policy import CLOSED, GRASP, OPEN, Policy, pour, put
+from tests.learn.policy import CLOSED, GRASP, OPEN, Policy, pour, pull, put
 from tests.robot.public_arms import J, urdf
 
 Env = gymnasium.Env[Numbers, Numbers]
@@ -89,6 +89,7 @@ def test_environments_in_a_vector_are_independent() -> None:
         ("PickPlace", 238, lambda policy: put(policy, "cube")),
         pytest.param("Stack", 0, lambda policy: put(policy, "upper"), marks=pytest.mark.long),
         pytest.param("Pour", 0, pour, marks=pytest.mark.long),
+        pytest.param("Drawer", 0, pull, marks=pytest.mark.long),
     ],
 )
 def test_scripted_policy_has_success(

@@ -18,29 +18,48 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.objects.grip import finger_forces
 from katana450.arm.control.objects.pouring import BASIN, CUP
 from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.object_joint import ObjectJoint
 from katana450.arm.control.state.scene_objects import SceneObject, Shape, named
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.physics.joint import BodyJoint
 from katana450.maths.water.units import MILLILITRE, ML
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
 Numbers = npt.NDArray[np.float32]
 
-TASKS = {"PickPlace": ("cube",), "Stack": ("upper", "lower"), "Pour": (CUP, BASIN)}
+TASKS = {
+    "PickPlace": ("cube",),
+    "Stack": ("upper", "lower"),
+    "Pour": (CUP, BASIN),
+    "Drawer": ("handle",),
+}
 """Names of the objects that are observed in each task. The first one is to be grasped."""
 
 SIDE = 0.04
 """[m] Length of a side of the cubes."""
+
+HANDLE, FRONT, CABINET = (0.07, 0.012, 0.06), (0.012, 0.16, 0.11), (0.12, 0.16, 0.11)
+"""[m] Sizes of the handle and the front of a drawer, and of the cabinet, along the drawer first."""
+
+HANDLE_HEIGHT, GAP = 0.036, 0.002
+"""[m] Height of the lower edge of a handle, and distance between a drawer and its cabinet."""
+
+TRAVEL, FRICTION, DAMPING, MASS = 0.1, 2.0, 5.0, 0.8
+"""[m, N, N s/m, kg] How far a drawer opens, and what its joint takes."""
 
 FILLED, WANTED = 100.0, 50.0
 """[ml] Water in the cup at the start, and in the basin at success."""
 
 RADIUS = 0.75, 1.0
 """[1] Range of the distances of places from axis 1, as ratios to that of the tool when ready."""
+
+HANDLE_RADIUS = 0.72, 0.79
+"""[1] The same of the handle of a closed drawer: it comes nearer as the drawer opens."""
 
 MAX_AZIMUTH, MAX_YAW = 0.6, 0.2
 """[rad] Maximum angle of a place beside the tool when ready, and of an object to its radius."""
@@ -75,6 +94,8 @@ class Table:
             return Scene((self._cube("cube"),), self._draw()[:3, 3])
         if task == "Stack":
             return Scene((self._cube("upper"), self._cube("lower")), np.array((0.0, 0.0, SIDE)))
+        if task == "Drawer":
+            return _drawer(self._draw(HANDLE_RADIUS, max_yaw=0.0))
         cup, basin = named(objects, CUP), named(objects, BASIN)
         if cup is None or basin is None:
             raise InputError("There is no cup or basin for this arm. Choose another task.")
@@ -83,18 +104,39 @@ class Table:
     def _cube(self, name: str) -> SceneObject:
         return SceneObject(name, Shape.BOX, (SIDE,) * 3, self._draw(), can_be_held=True)
 
-    def _draw(self) -> FloatArray:
+    def _draw(self, radius: tuple[float, float] = RADIUS, max_yaw: float = MAX_YAW) -> FloatArray:
         """Return the pose (4, 4) of an object with room around it."""
         while True:
             azimuth = self._azimuth + self._rng.uniform(-MAX_AZIMUTH, MAX_AZIMUTH)
-            radius = self._radius * self._rng.uniform(*RADIUS)
-            place = self._axis + radius * np.array((math.cos(azimuth), math.sin(azimuth)))
-            yaw = azimuth + self._rng.uniform(-MAX_YAW, MAX_YAW)
+            distance = self._radius * self._rng.uniform(*radius)
+            place = self._axis + distance * np.array((math.cos(azimuth), math.sin(azimuth)))
+            yaw = azimuth + self._rng.uniform(-max_yaw, max_yaw)
             # An arm too small for the room gets places without it.
             room = min(ROOM, 0.5 * MAX_AZIMUTH * self._radius)
             if all(math.dist(place, other) > room for other in self._places):
                 self._places.append(place)
                 return se3.from_rotation_translation(so3.rotation_z(yaw), (*place, 0.0))
+
+
+def _drawer(T: FloatArray) -> Scene:
+    """Return a closed drawer that opens against x of ``T`` (4, 4), and has its handle there."""
+    front = 0.5 * (HANDLE[0] + FRONT[0])
+    cabinet = front + 0.5 * (FRONT[0] + CABINET[0]) + GAP
+    axis = tuple((-T[:3, 0]).tolist())
+    joint = BodyJoint(True, (0.0,) * 3, axis, 0.0, TRAVEL, FRICTION, DAMPING, MASS)
+
+    def part(name: str, size: tuple[float, ...], x: float, z: float) -> SceneObject:
+        pose = T @ se3.from_rotation_translation(np.eye(3), (x, 0.0, z))
+        moves = None if name == "cabinet" else ObjectJoint("drawer", joint, pose)
+        held = name == "handle"
+        return SceneObject(name, Shape.BOX, size, pose, can_be_held=held, joint=moves)
+
+    objects = (
+        part("cabinet", CABINET, cabinet, 0.0),
+        part("drawer", FRONT, front, GAP),
+        part("handle", HANDLE, 0.0, HANDLE_HEIGHT),
+    )
+    return Scene(objects, joint.motion(TRAVEL)[:3, 3] + objects[-1].T[:3, 3])
 
 
 PLACE_ERROR = 0.01
