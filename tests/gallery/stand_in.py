@@ -72,6 +72,11 @@ XACRO = """<robot name="$(arg name)" xmlns:xacro="http://www.ros.org/wiki/xacro"
 """
 
 NO_NETWORK = """
+import sys
+
+print("Cloning: 0 %", end="", file=sys.stderr)
+
+
 class GitCommandError(Exception):
     pass
 

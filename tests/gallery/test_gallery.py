@@ -119,8 +119,9 @@ def test_xacro_is_expanded_with_its_arguments_and_finds_its_meshes(
 
 
 @pytest.mark.usefixtures("arms")
-def test_each_failure_of_a_download_says_what_to_do() -> None:
+def test_each_failure_of_a_download_says_what_to_do(capsys: pytest.CaptureFixture[str]) -> None:
     message = why("panda")
+    assert capsys.readouterr().err.endswith("Cloning: 0 %\n")
     assert "cannot be downloaded from https://example.org/arms: Unable to access" in message
     assert "Could not resolve host: example.org" in message
     assert "Check the connection" in message

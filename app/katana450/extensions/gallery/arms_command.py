@@ -7,15 +7,14 @@ import re
 import sys
 from argparse import Namespace
 from collections.abc import Mapping
-from contextlib import redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from sys import stderr
 from types import ModuleType
-from typing import Any
+from typing import Any, TextIO
 from xml.etree.ElementTree import fromstring
 
 from katana450.arm.robot.description import checked
@@ -143,9 +142,10 @@ def file_of(robot: ListedRobot) -> Path:
 
 def _downloaded(robot: ListedRobot) -> ModuleType:
     """Return the module of ``robot``, whose import clones its repository with git."""
+    # The package reports its progress on standard output, which is for our own answers.
+    output = _ProgressOutput(sys.stderr)
     try:
-        # The package reports its progress on standard output, which is for our own answers.
-        with redirect_stdout(stderr):
+        with redirect_stdout(output), redirect_stderr(output):
             return import_module(robot.module)
     except ImportError as error:
         if "git" in str(error).lower():
@@ -163,6 +163,35 @@ def _downloaded(robot: ListedRobot) -> ModuleType:
             f"{_reason(error)} Check the connection to the network. Robots that were downloaded "
             "before need none."
         ) from error
+    finally:
+        output.end()
+
+
+class _ProgressOutput:
+    """A stream for the progress of a download, whose last line ends before an error is printed."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream: TextIO | None = stream
+        self._last = "\n"
+
+    def write(self, text: str) -> int:
+        if self._stream is not None and text:
+            self._last = text[-1]
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        if self._stream is not None:
+            self._stream.flush()
+
+    def isatty(self) -> bool:
+        return self._stream is not None and self._stream.isatty()
+
+    def end(self) -> None:
+        """End the line, and ignore what comes later, as from a bar that is closed at last."""
+        if self._last != "\n":
+            self.write("\n")
+        self._stream = None
 
 
 def _reason(error: Exception) -> str:
