@@ -50,8 +50,6 @@ log = logging.getLogger(__name__)
 RECENT = 600.0
 """[s] Maximum age of a recording that the notice is about; the ring holds ten minutes."""
 
-EARLIER = "What was recorded before the restart is still on the timeline, below the scene."
-
 
 class EpisodeKeeper:
     """Keeps the episodes of one server. Every method may be called in any thread."""
@@ -81,7 +79,7 @@ class EpisodeKeeper:
         self._clock, self._utc_offset = clock, 1e-9 * int(run)
         self._requests = threading.Lock()
         self._changed = threading.Condition()
-        self._notice = EARLIER if _has_recent(ring_folder) else ""
+        self._notice = _earlier(ring_folder)
         self._revision = 0
         self._running = RunningEpisode(folder, ring, ring_folder, run, self._note_change)
         interrupted, last = folder.markers(), folder.last()
@@ -319,8 +317,14 @@ class EpisodeKeeper:
         self._folder.release()
 
 
-def _has_recent(folder: Path) -> bool:
-    """Return whether ``folder`` has a recording of a run that ended a short time ago."""
+def _earlier(folder: Path) -> str:
+    """Return a sentence about what the run before this one recorded; "" for nothing recent."""
     with suppress(OSError):
-        return any(time.time() - path.stat().st_mtime < RECENT for path in recordings_in(folder))
-    return False
+        for path in reversed(recordings_in(folder)):
+            if time.time() - path.stat().st_mtime > RECENT:
+                break
+            return (
+                f"What was recorded before the restart is in {path.name}, in the folder that the "
+                "server names at its start. The timeline opens it by Open a file…"
+            )
+    return ""
