@@ -195,7 +195,7 @@ def test_calibrate_is_left_to_lerobot(loop: SmallLoop) -> None:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of the motor ``number``, which the server gets and loses, and what is reported of it."""
+    """A fault of a motor, which comes and goes, and what is reported of it."""
 
     name: str
     words: str
@@ -277,6 +277,7 @@ def test_lost_arm_is_reported_and_found_again(
         for motor in server.arm.motors:
             motor.silent = True
     loop.wait(ArmMode.LOST, PATIENCE)
+    wait_until(lambda: "Trying to connect" in loop.report.note, "the driver has noticed")
     loop.stop()
     with server.lock:
         for motor in server.arm.motors:

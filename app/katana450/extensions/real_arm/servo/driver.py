@@ -131,7 +131,7 @@ class ServoDriver(DriverThread[ServoMachine, MotorBus]):
             self._machine.measured(Readings(t, places, speeds, loads, volts, celsius, errors))
         elif packets:
             self._machine.silent([motor for motor in ids if motor not in packets], now)
-        elif now - bus.heard_at > SILENT_TIME:
+        elif now - bus.heard_at > 3.0 * SILENT_TIME:
             raise BusLostError("No motor answers. Check the power supply and the cable.")
 
     def _perform(self, bus: MotorBus, act: ArmAct) -> None:
