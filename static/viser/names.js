@@ -8,7 +8,7 @@ export const NARROW = "(max-width: 36em)";
 export const PANEL = '.mantine-Paper-root[style*="position: fixed"]';
 export const PANEL_HANDLE = `${PANEL} [style*="height: 3.5em"]`;
 export const PANEL_CONTENT = `${PANEL} [style*="width: 20em"]`;
-export const PANEL_FOLD = "[data-dock-region-collapse], [data-dock-minimize-all]";
+export const PANEL_FOLD = "[role=button][aria-expanded]";
 export const PANEL_GROUND = "var(--mantine-color-body)";
 // The hint of a control, which lies over other ones.
 export const HINT = "[role=tooltip]";
