@@ -1,4 +1,4 @@
-"""Take the animated pictures of the README from the app: ``python -m docs.films [drag] [pour]``."""
+"""Take the animated pictures of the README from the app: ``python -m docs.films [NAME …]``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ VIEW = Camera((0.95, -1.10, 0.62), (0.26, -0.02, 0.26), 0.72)
 STROKES: tuple[tuple[Axis, tuple[float, float]], ...] = (("z", (0.12, 0.0)), ("x", (0.26, 0.0)))
 """Arrow of the gizmo, and the values [m] to which the mouse moves it, one after the other."""
 
-POUR_REGION = (400, 260, 1136, 790)
+POUR_REGION, TOWER_REGION = (400, 260, 1136, 790), (480, 240, 1216, 770)
 """Left, top, right and bottom [pixels] of the part of the drawn frames that is shown."""
 
 CURSOR = """
@@ -68,13 +68,13 @@ def drag() -> Iterable[Image.Image]:
         page.close()
 
 
-def pour() -> Iterable[Image.Image]:
-    """Yield frames of the pouring demo, drawn from its plan and cut to the arm and the objects."""
+def run(script: str, region: tuple[int, int, int, int], fps: int) -> Iterable[Image.Image]:
+    """Yield frames of a script, drawn from its plan and cut to ``region``."""
     with tempfile.TemporaryDirectory() as folder:
-        film = Path(folder, "pour.mp4")
-        options = ["--run", "pour", "--out", str(film), "--size", "1280x800", "--fps", "4"]
+        film = Path(folder, "run.mp4")
+        options = ["--run", script, "--out", str(film), "--size", "1280x800", "--fps", str(fps)]
         subprocess.run([sys.executable, "-m", "katana450", "render", *options], check=True)
-        yield from (Image.fromarray(frame).crop(POUR_REGION) for frame in imageio.imiter(film))
+        yield from (Image.fromarray(frame).crop(region) for frame in imageio.imiter(film))
 
 
 def shot(page: ViserPage) -> Image.Image:
@@ -108,7 +108,11 @@ def save(name: str, frames: Iterable[Image.Image]) -> Path:
     return film
 
 
-FILMS: dict[str, Callable[[], Iterable[Image.Image]]] = {"drag": drag, "pour": pour}
+FILMS: dict[str, Callable[[], Iterable[Image.Image]]] = {
+    "drag": drag,
+    "pour": lambda: run("pour", POUR_REGION, 4),
+    "tower": lambda: run("examples/programs/tower.yaml", TOWER_REGION, 12),
+}
 
 
 def main() -> None:

@@ -158,6 +158,16 @@ def start_of(stage: Stage, name: str) -> State:
 
 
 @pytest.mark.long
+def test_tower_is_knocked_over(stage: Stage) -> None:
+    start = start_of(stage, "tower")
+    program = compiled(script("tower"), stage.plan_context, start)
+    _, states = stage.play(program, start, most=2_000)
+    heights = [thing.T[2, 3] for thing in states[-1].objects]
+    assert max(thing.T[2, 3] for thing in start.objects) == pytest.approx(0.16, abs=1e-3)
+    assert max(heights) < 0.05
+
+
+@pytest.mark.long
 def test_ten_boxes_arrive_where_the_script_says(stage: Stage) -> None:
     start = start_of(stage, "boxes")
     program = compiled(script("boxes"), stage.plan_context, start)
