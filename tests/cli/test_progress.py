@@ -1,4 +1,4 @@
-"""Progress is shown only on a terminal."""
+"""Progress is shown only on a terminal, and Ctrl-C ends a command at any time."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import io
 
 import pytest
 
+import katana450.cli.main as command
+from katana450 import cli
 from katana450.extensions.progress import progress
 
 
@@ -31,3 +33,17 @@ def test_the_line_ends_when_the_work_breaks_off() -> None:
     with pytest.raises(KeyboardInterrupt):
         working.throw(KeyboardInterrupt())  # type: ignore[attr-defined]
     assert terminal.getvalue().endswith("\n")
+
+
+class Interrupting:
+    """Is interrupted as it gets its name, while Python creates the class that holds it."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        raise KeyboardInterrupt
+
+
+def test_an_interrupt_while_a_class_is_created_ends_a_command(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(command, "main", lambda: type("Holder", (), {"held": Interrupting()}))
+    assert cli.main() == 130

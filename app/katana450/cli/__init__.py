@@ -10,3 +10,8 @@ def main() -> int:
         return run()
     except KeyboardInterrupt:
         return 130
+    except RuntimeError as error:
+        # So Python reports an interrupt while it creates a class.
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            return 130
+        raise
