@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 
 import pytest
 
-import katana450.cli.main as command
-from katana450 import cli
+import katana450.cli.main
 from katana450.extensions.progress import progress
 
 
@@ -45,5 +45,9 @@ class Interrupting:
 def test_an_interrupt_while_a_class_is_created_ends_a_command(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(command, "main", lambda: type("Holder", (), {"held": Interrupting()}))
-    assert cli.main() == 130
+    monkeypatch.setattr(
+        katana450.cli.main, "main", lambda: type("Holder", (), {"held": Interrupting()})
+    )
+    # The package has the name of its module as an attribute as soon as that is imported.
+    monkeypatch.setattr(katana450.cli, "main", katana450.cli.main)
+    assert importlib.reload(katana450.cli).main() == 130
