@@ -79,14 +79,17 @@ def places(server: ServoServer) -> list[float]:
         return [motor.place for motor in server.arm.motors]
 
 
-def goals(server: ServoServer) -> list[int]:
+def values(server: ServoServer, register: reg.Register) -> list[int]:
     with server.lock:
-        return [motor[reg.GOAL_POSITION] for motor in server.arm.motors]
+        return [motor[register] for motor in server.arm.motors]
+
+
+def goals(server: ServoServer) -> list[int]:
+    return values(server, reg.GOAL_POSITION)
 
 
 def torques(server: ServoServer) -> list[int]:
-    with server.lock:
-        return [motor[reg.TORQUE_ENABLE] for motor in server.arm.motors]
+    return values(server, reg.TORQUE_ENABLE)
 
 
 def test_ticks_and_joints_are_inverse_and_the_middle_is_the_middle_of_the_joint(
@@ -206,25 +209,18 @@ class Fault:
     def put(self, server: ServoServer, number: int, *, present: bool) -> None:
         motor = server.arm.motors[number]
         with server.lock:
-            match self.name:
-                case "silent":
-                    motor.silent = present
-                case "blocked":
-                    motor.blocked = present
-                    motor.fault = MotorError(0)
-                case "reset":
-                    motor[reg.TORQUE_ENABLE] = int(not present)
-                case "voltage":
-                    motor.volts = 4.2 if present else 7.4
-                    motor.fault = MotorError.VOLTAGE if present else MotorError(0)
-                case _:
-                    motor.fault = MotorError[self.name.upper()] if present else MotorError(0)
+            if self.name in ("silent", "blocked"):
+                setattr(motor, self.name, present)
+            elif self.name == "reset":
+                motor[reg.TORQUE_ENABLE] = int(not present)
+            else:
+                motor.fault = MotorError[self.name.upper()] if present else MotorError(0)
 
 
 FAULTS = (
     Fault("overload", r"is overloaded and has reduced its force"),
     Fault("overheat", r"is too hot.*30 °C"),
-    Fault("voltage", r"voltage.*4\.2 V"),
+    Fault("voltage", r"voltage.*7\.4 V"),
     Fault("overcurrent", r"takes too much current"),
     Fault("angle", r"fault of its sensor"),
     Fault("silent", r"No answer of"),
@@ -325,12 +321,24 @@ def test_foreign_calibration_is_refused(server: ServoServer, arm: Robot) -> None
     assert torques(server) == [0] * 6
 
 
-def test_joint_far_beyond_its_limit_is_noticed(server: ServoServer, loop: SmallLoop) -> None:
+def test_arm_beyond_its_limit_does_not_jump(server: ServoServer, arm: Robot) -> None:
+    """The pan is 20 degrees beyond its limit, in a range that was calibrated wider."""
+    own, pan, place = calibration(), server.arm.motors[0], 2070 + round(130.0 / 360.0 * 4096)
+    own["shoulder_pan"] = msgspec.structs.replace(own["shoulder_pan"], range_min=45, range_max=4095)
     with server.lock:
-        motor = server.arm.motors[1]
-        motor._ends, motor._sag, motor.place = (-2000, 4000), 0.0, 500.0
-    connect(loop)
-    wait_until(lambda: "beyond its limit" in loop.report.note, loop.report.note)
+        pan[reg.MIN_POSITION], pan[reg.MAX_POSITION] = pan._ends = 45, 4095
+        pan.place = float(place)
+    with driven(server, arm, own=own) as loop:
+        connect(loop)
+        wait_until(lambda: "shoulder_pan is beyond its limit" in loop.report.note, "it is named")
+        loop.act(ArmAct.ENGAGE, ArmMode.HOLDING, PATIENCE)
+        assert goals(server)[0] == place
+        engage(loop)
+        move(loop)
+        loop.stop()
+        wait_until(lambda: loop.report.mode is ArmMode.HOLDING, "the arm rests")
+        assert abs(goals(server)[0] - places(server)[0]) < 10
+        assert places(server)[0] > place - 100
 
 
 @pytest.mark.parametrize(
@@ -346,10 +354,15 @@ def test_joint_far_beyond_its_limit_is_noticed(server: ServoServer, loop: SmallL
 def test_options_that_name_no_such_arm_are_refused(
     arm: Robot, options: dict[str, str], message: str
 ) -> None:
-    values: dict[str, object] = {"device": None, "arm": None, "calibration": None, "arm_log": None}
+    defaults: dict[str, object] = {
+        "device": None,
+        "arm": None,
+        "calibration": None,
+        "arm_log": None,
+    }
     paths = {name: Path(value) for name, value in options.items() if name == "calibration"}
     with pytest.raises(KatanaError, match=message):
-        driver(Namespace(**values | options | paths), arm, np.zeros(5), 0.0)
+        driver(Namespace(**defaults | options | paths), arm, np.zeros(5), 0.0)
 
 
 @pytest.mark.long

@@ -25,6 +25,9 @@ JAW = len(MOTORS) - 1
 MAX_SPEED = 6.0
 """[rad/s] Speed of the goals; a motor without load turns at 5 rad/s."""
 
+RETURN_SPEED = 0.1
+"""[rad/s] Speed at which an arm that began beyond its limits is led back."""
+
 MAX_STEP_TIME = 0.05
 """[s] Time between two setpoints for which the goals move at most."""
 
@@ -90,6 +93,7 @@ class ServoMachine(ArmModes):
         self.hurries = False
         self._joints, self._travel = joints, travel
         self._q, self._speeds, self._t = frozen(start), frozen(np.zeros(len(MOTORS))), 0.0
+        self._place = self._q
         self._sensors: tuple[float, ...] = ()
         self._goal = self._sag = np.zeros(len(MOTORS))
         self._writes, self._apart = 0.0, frozenset[int]()
@@ -156,9 +160,12 @@ class ServoMachine(ArmModes):
         elif not stopped and self.mode.follows:
             if self._stopped:
                 # The arm hangs below its goals, and would sink again without this.
-                self._sag = np.clip(self._goal - self._q, -SAG, SAG)
+                self._sag = self._goal - self._q
                 self._sag[JAW] = 0.0
-            reach = MAX_SPEED * min(max(t - self._steered, 0.0), MAX_STEP_TIME)
+            dt = min(max(t - self._steered, 0.0), MAX_STEP_TIME)
+            reach, back = MAX_SPEED * dt, RETURN_SPEED * dt
+            more = self._sag - np.clip(self._sag, -SAG, SAG)
+            self._sag = self._sag - np.clip(more, -back, back)
             self._goal = self._goal + np.clip(joints + self._sag - self._goal, -reach, reach)
             if not self._setpoints or (joints != self._setpoints[-1][1]).any():
                 self._changed = t
@@ -179,7 +186,7 @@ class ServoMachine(ArmModes):
         """Note that the motors hold the arm where it was measured."""
         self.mode, self.note = ArmMode.HOLDING, ""
         self._apart, self._writes, self._stopped = frozenset(), np.inf, True
-        self._goal, self.hurries = self._q, False
+        self._goal, self.hurries = self._place, False
         self._heard = dict.fromkeys(self._heard, now)
         self._stalled[:] = np.inf
         self._stopping = self._measured_stop = None
@@ -200,6 +207,8 @@ class ServoMachine(ArmModes):
     def measured(self, readings: Readings) -> None:
         """Take a reading of all motors."""
         joints = self._joints.joints(readings.ticks)
+        # The goals are where the arm is, also beyond a limit, to which it would jump.
+        self._place = joints
         self._q = frozen(np.clip(joints, self._joints.lower, self._joints.upper))
         self._speeds = frozen(readings.speeds * self._joints.scale)
         self._t = readings.t
@@ -257,7 +266,7 @@ class ServoMachine(ArmModes):
         if self.mode is ArmMode.MOVING:
             self._stopping, self._measured_stop = (t, self._q), None
         keeps[:JAW] &= rests and t - self._changed > REST_TIME
-        self._goal = np.where(keeps, self._goal, self._q)
+        self._goal = np.where(keeps, self._goal, self._place)
         self._setpoints.clear()
         self.hurries = True
 
