@@ -83,9 +83,7 @@ def test_server_refuses_an_arm_that_it_cannot_drive(options: tuple[str, ...], wo
     assert words in done.stderr
 
 
-@pytest.mark.parametrize(
-    "options", [("--port", "70000"), ("--object", "nan"), ("--calibration-scale", "0")]
-)
+@pytest.mark.parametrize("options", [("--port", "70000"), ("--calibration-scale", "0")])
 def test_wrong_options_of_the_emulator_are_refused(options: tuple[str, str]) -> None:
     done = katana450("emulate", *options)
     assert done.returncode == 2

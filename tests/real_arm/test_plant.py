@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,12 +10,6 @@ import pytest
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.real_arm.plant.axis import KATANA450, PlantAxis
 from katana450.extensions.real_arm.plant.loads import GravityLoads
-
-START = np.array([0.0, -1.0, 1.0, 0.5, 0.0])
-
-TICK = 0.01
-
-GANTRY = Path(__file__).parents[1] / "exchange" / "gantry.urdf"
 
 
 def axis(**changes: float) -> PlantAxis:

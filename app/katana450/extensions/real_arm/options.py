@@ -28,9 +28,6 @@ STOP_BUTTON = (
 
 ADDRESS_HELP = "address of the arm: tcp://HOST, tcp://HOST:PORT, or a serial port as /dev/ttyUSB0"
 
-WIDEST_OBJECT = 120.0
-"""[mm] Gap of the open gripper."""
-
 
 def add_emulate_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 emulate`` to ``parser``."""
@@ -45,12 +42,6 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=port, help=f"0 for any free port (default: {PORT} or 5567)")
     parser.add_argument(
         "--calibration", type=Path, metavar="FILE", help="so101: write its calibration there"
-    )
-    parser.add_argument(
-        "--object",
-        type=number(1.0, WIDEST_OBJECT, "mm"),
-        metavar="MM",
-        help="width of an object between the fingers",
     )
     parser.add_argument(
         "--calibrated", action="store_true", help="begin calibrated and holding, for tests"

@@ -101,37 +101,6 @@ def _set_stop(axis: EmulatedAxis) -> None:
     axis.offset = axis.facts.stop - round(axis.plant.position)
 
 
-OPEN_ENCODER, CLOSED_ENCODER = 30770, 12240
-"""Counts of the open and the closed gripper."""
-
-CLOSED_GAP, OPEN_GAP = 0.4, 120.4
-"""[mm] Distance of the finger tips there, measured on the meshes."""
-
-SENSORS = 16
-"""Number of bytes in an answer."""
-
-FORCE_SENSORS = (6, 7, 14, 15)
-"""Places of the force sensors: rear and front of the right finger, then of the left one."""
-
-
-def encoder_at_gap(gap: float) -> float:
-    """Return the counts of axis 6 at which the finger tips are about ``gap`` [mm] apart.
-
-    Between closed and open the gap is up to 5 mm wider than a straight line gives.
-    """
-    opened = (gap - CLOSED_GAP) / (OPEN_GAP - CLOSED_GAP)
-    return CLOSED_ENCODER + opened * (OPEN_ENCODER - CLOSED_ENCODER)
-
-
-def sensor_values(squeeze: float) -> tuple[int, ...]:
-    """Return the bytes (16,) of all sensors. The others read 0: how they behave is not known.
-
-    ``squeeze``: force on the object, as a fraction of the whole effort of the motor.
-    """
-    force = min(round(255 * squeeze), 255)
-    return tuple(force if place in FORCE_SENSORS else 0 for place in range(SENSORS))
-
-
 ENCODERS = EncoderMap()
 
 
@@ -189,7 +158,6 @@ class EmulatedArm:
         *,
         calibrated: bool = False,
         calibration_scale: float = 1.0,
-        object_width: float | None = None,
     ) -> None:
         """Create an arm at rest.
 
@@ -198,7 +166,6 @@ class EmulatedArm:
             loads: weights on its axes.
             calibrated: whether it begins as after a calibration, in that posture, holding.
             calibration_scale: simulated seconds in a second during a calibration.
-            object_width: width of an object between the fingers [mm]; None without one.
         """
         posture = [motor.sign * CALIBRATED_AT for motor in MOTORS]
         places = posture if calibrated else POWER_UP_POSTURE
@@ -208,7 +175,6 @@ class EmulatedArm:
         self.time = 0.0
         self.detects_collisions = True
         self.collided = 0
-        self.object_width = object_width
         self._scale = calibration_scale
         self._loads = loads
         self._weights: Sequence[float] = (0.0,) * len(self.axes)
@@ -216,7 +182,6 @@ class EmulatedArm:
         self._done = 0
         self._steps = 0
         self._rests = False
-        self.axes[GRIPPER].plant.contact = encoder_at_gap(object_width or 0.0)
         for axis in self.axes:
             axis.is_supported = True
             if calibrated:
@@ -232,11 +197,6 @@ class EmulatedArm:
     def counts(self) -> tuple[float, ...]:
         """Where the links are, (6,) in counts of the calibrated arm."""
         return tuple(axis.plant.output for axis in self.axes)
-
-    @property
-    def sensors(self) -> tuple[int, ...]:
-        """Bytes (16,) of the sensors of the gripper."""
-        return sensor_values(self.axes[GRIPPER].plant.squeeze)
 
     def step(self, dt: float) -> None:
         """Simulate the next ``dt`` [s] in steps of fixed length; what is left follows later."""

@@ -190,9 +190,6 @@ SPEED_LIMIT, ACCELERATION_LIMIT, COLLISION_LIMIT, SPLINE_COLLISION_LIMIT = 3, 4,
 PRESSING_TIME = 0.15
 """[s] Time at the whole current of the motor that counts as a collision. Assumed."""
 
-SOFTNESS = 100.0
-"""[counts] Depth to which the whole effort of a finger squeezes an object. Assumed."""
-
 PWM_MAX = 127
 """Drive at the whole effort, as the larger limits of the configuration."""
 
@@ -233,7 +230,6 @@ class EmulatedAxis:
             facts.axis.speed / TICK,
             MAX_ACCELERATION / facts.halving,
             facts.counts_per_radian,
-            SOFTNESS,
         )
         self.splines = SplineBuffer()
         self._move = TargetMove(position, 0.0, position)
@@ -334,8 +330,7 @@ class EmulatedAxis:
                 before = plant.speed
                 plant.brake(load)
                 self.setpoint, self._speed = plant.position, 0.0
-                if plant.speed * before <= 0.0 or plant.squeeze > 0.0:
-                    # What it squeezes would push it back if it only braked.
+                if plant.speed * before <= 0.0:
                     self.mode = AxisMode.HOLD
                 return True
             case AxisMode.TARGET:

@@ -34,6 +34,9 @@ PARAMETERS = 12
 
 NO_ERROR = replies.FirmwareError(0, -1, 0, "")
 
+NO_FORCES = (0,) * 16
+"""Bytes of the sensors of the gripper: how they behave is not known."""
+
 
 class RequestError(Exception):
     """A request is refused, with the number of the error, the axis and the words."""
@@ -87,7 +90,7 @@ class Firmware:
                 arm.detects_collisions = bool(enabled)
                 return replies.CollisionDetectionSet()
             case req.ReadSensors(controller):
-                return replies.SensorBytes(controller, arm.sensors)
+                return replies.SensorBytes(controller, NO_FORCES)
             case req.ReadMasterVersion():
                 return replies.MasterVersion(*VERSION)
             case req.ReadArmIdentity():

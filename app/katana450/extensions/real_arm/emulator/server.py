@@ -127,7 +127,9 @@ class DeviceServer(Generic[ArmT]):
     def _advance(self) -> None:
         """Move the arm to the present time."""
         now = time.monotonic()
-        longest = LONGEST_SCALED_STEP if self.arm.is_calibrating else LONGEST_STEP
+        longest = (
+            LONGEST_SCALED_STEP if getattr(self.arm, "is_calibrating", False) else LONGEST_STEP
+        )
         self.arm.step(min(now - self._now, longest))
         self._now = now
 
@@ -210,7 +212,6 @@ def emulate(options: Namespace) -> int:
             loads=loads_of_robot(load()),
             calibrated=options.calibrated,
             calibration_scale=options.calibration_scale,
-            object_width=options.object,
         )
         emulator = EmulatorServer(arm, PORT if options.port is None else options.port)
     raise_priority()

@@ -17,8 +17,6 @@ from dataclasses import dataclass
 class PlantProfile:
     """Numbers by which the axes of a simulated arm follow their setpoints.
 
-    Lengths of sliding joints take the place of angles, in m instead of rad.
-
     Attributes:
         bandwidth: natural frequency of the position control of an axis [rad/s].
         damping: its damping ratio.
@@ -39,18 +37,6 @@ class PlantProfile:
     fall: float
     reserve: float
 
-
-STIFF = PlantProfile(
-    bandwidth=200.0,
-    damping=1.0,
-    coulomb=1e-3,
-    viscous=0.0,
-    droop=0.0,
-    backlash=0.0,
-    fall=5.0,
-    reserve=1e3,
-)
-"""Axes that follow within 0.01 degrees: for tests of everything but the plant. Not measured."""
 
 KATANA450 = PlantProfile(
     # Assumed: a fourteenth of the rate of the internal bus, which has 100 cycles a second.
@@ -84,15 +70,12 @@ STICTION = 1.05
 """Friction of an axis at rest as a multiple of that in motion. It also ends a creeping motion,
 which would approach its end without reaching it."""
 
-SMALLEST = 1e-9
-"""[unit/s^2] Acceleration limit of an axis that cannot move, as of fingers that do not exist."""
-
 LIGHT = 0.02
 """Fraction of the largest weight below which friction holds a link inside its play."""
 
 
 class PlantAxis:
-    """The state of one axis. Its unit of angle is the caller's: rad, m or encoder counts.
+    """The state of one axis. Its unit of angle is the caller's: rad or encoder counts.
 
     Attributes:
         position: angle of the motor, in angles of the joint [unit].
@@ -100,7 +83,6 @@ class PlantAxis:
         output: angle of the link [unit]; within half the backlash of ``position``.
         effort: acceleration that the motor asks for, as a fraction of its largest: -1 to 1.
         lower, upper: mechanical stops [unit].
-        contact: angle below which something soft is squeezed [unit], or minus infinity.
     """
 
     def __init__(
@@ -111,7 +93,6 @@ class PlantAxis:
         max_speed: float,
         max_acceleration: float,
         unit: float = 1.0,
-        softness: float = 1.0,
     ) -> None:
         """Create an axis at rest.
 
@@ -121,15 +102,13 @@ class PlantAxis:
             stops: lower and upper mechanical stop [unit].
             max_speed: largest speed of the motor [unit/s].
             max_acceleration: acceleration limit of the arm [unit/s^2].
-            unit: number of units in a radian, or in a metre.
-            softness: depth to which the whole effort of the motor squeezes a contact [unit].
+            unit: number of units in a radian.
         """
         self.position = self.output = position
         self.lower, self.upper = stops
         self.speed = self.effort = 0.0
-        self.contact = -math.inf
         self._max_speed = max_speed
-        self._max_acceleration = max(max_acceleration, SMALLEST) * profile.reserve
+        self._max_acceleration = max_acceleration * profile.reserve
         self._spring = profile.bandwidth**2
         self._damping = 2.0 * profile.damping * profile.bandwidth
         self._viscous = profile.viscous
@@ -137,13 +116,6 @@ class PlantAxis:
         self._droop = profile.droop * unit * self._spring
         self._fall = profile.fall * unit
         self._play = 0.5 * profile.backlash * unit
-        self._softness = self._max_acceleration / softness
-
-    @property
-    def squeeze(self) -> float:
-        """Force on a contact, as a fraction of the force of the whole effort."""
-        depth = self.contact - self.position
-        return max(depth * self._softness / self._max_acceleration, 0.0)
 
     def follow(self, target: float, speed: float, load: float) -> bool:
         """Take a step. The setpoint at its end is ``target`` [unit], with ``speed`` [unit/s].
@@ -168,10 +140,6 @@ class PlantAxis:
         drive = min(max(drive, -limit), limit)
         self.effort = drive / limit
         before, slid = self.position, self.output
-        if before < self.contact:
-            # What is soft damps, too; without that, fingers would bounce.
-            drive += self._softness * (self.contact - before)
-            drive -= math.sqrt(self._softness) * self.speed
         speed = self.speed + (drive - weight * load - self._viscous * self.speed) * STEP
         # Friction ends a motion but begins none, so an axis comes to rest exactly.
         if abs(speed) <= STICTION * self._coulomb:
