@@ -260,15 +260,6 @@ def test_stop_freezes_the_fastest_axis_first_and_is_measured(talk: Conversation)
     assert talk.reports[-1][1].measured_stop is None
 
 
-def test_stop_at_rest_sends_nothing(talk: Conversation) -> None:
-    talk.engage()
-    talk.run(0.3)
-    count = len(talk.motors)
-    talk.stopped = True
-    talk.run(0.5)
-    assert len(talk.motors) == count
-
-
 def test_slow_exchanges_freeze_each_axis_at_a_fresh_position(talk: Conversation) -> None:
     talk.engage()
     talk.delay = lambda: 0.04

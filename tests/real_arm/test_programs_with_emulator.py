@@ -25,7 +25,6 @@ from katana450.extensions.real_arm.emulator.firmware import Firmware, RequestErr
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
-from tests.real_arm.measured_run import measured_run
 from tests.real_arm.paper_arm import ENDS, MAP
 
 LIBRARY = Path(katana450.extensions.programs.__file__).parent / "library"
@@ -131,14 +130,9 @@ def test_program_runs_with_slow_replies(name: str, monkeypatch: pytest.MonkeyPat
         for t, position in knots.found
         if round(t / PERIOD) in setpoints
     ]
-    run = measured_run(session.require_arm(), states)
-    print(name, max(errors), max(compared), max(lags), len(compared), last.t, run)
+    print(name, max(errors), max(compared), max(lags), len(compared), last.t)
     assert len(compared) > 100
     assert max(compared) <= 0.5 + 1e-9
     # With the arm where it should be, 0.33 s behind its setpoint.
     assert max(errors) < 0.002
     assert max(lags) > 0.01
-    # The report has both apart: four polynomials and one exchange late, and still on the path.
-    assert 0.32 < run.lag < 0.48
-    assert 0.0 < run.error < 2e-3
-    assert run.commanded < 1e-9

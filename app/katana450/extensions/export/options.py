@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,11 +42,6 @@ FORMATS: Mapping[str, ExportFormat] = {
 """The formats by their names."""
 
 
-def named(trait: Callable[[ExportFormat], bool]) -> list[str]:
-    """Return the names of the formats of which ``trait`` is true."""
-    return [name for name, row in FORMATS.items() if trait(row)]
-
-
 def add_export_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 export`` to ``parser``."""
     parser.add_argument(
@@ -83,10 +78,10 @@ def export_format(options: argparse.Namespace) -> int:
     """Execute ``katana450 export``; return the exit status."""
     row = FORMATS[options.format]
     if not row.scene and not options.objects:
-        names = " or ".join(named(lambda listed: listed.scene))
+        names = " or ".join(name for name, listed in FORMATS.items() if listed.scene)
         raise InputError(f"{options.format} has no objects. Use --no-objects with {names}.")
     if options.pose and not row.posed:
-        names = ", ".join(named(lambda listed: listed.posed))
+        names = ", ".join(name for name, listed in FORMATS.items() if listed.posed)
         raise InputError(f"{options.format} has no pose. Use --pose with {names}.")
     from katana450.extensions.export.export import export
 

@@ -75,18 +75,13 @@ def of_script(name: str, urdf: Path) -> Playback:
 
 def of_pose(pose: Sequence[float], urdf: Path) -> Playback:
     """Return the robot at rest with its driven joints at ``pose`` [rad, m]; ready if empty."""
-    robot, session = _described(urdf)
+    robot, session, notes = find_robot(Settings(), urdf, None)
+    for note in notes:
+        print(f"katana450: {note}", file=sys.stderr)
     if pose:
         return Playback(robot, session, [_standing(robot, session, robot.values(pose))], 1.0)
     gripper = 0.0 if session.arm is None else session.arm.gripper.clamp(0.0)
     return Playback(robot, session, [session.begin(session.ready, gripper, 0.0)], 1.0)
-
-
-def _described(urdf: Path) -> tuple[Robot, Session]:
-    robot, session, notes = find_robot(Settings(), urdf, None)
-    for note in notes:
-        print(f"katana450: {note}", file=sys.stderr)
-    return robot, session
 
 
 def _standing(robot: Robot, session: Session, values: dict[str, float]) -> State:

@@ -112,8 +112,6 @@ PRESENT_VOLTAGE = Register(62, 1)
 """[0.1 V]"""
 PRESENT_TEMPERATURE = Register(63, 1)
 """[degrees C]"""
-STATUS = Register(65, 1)
-"""The MotorError of the motor, which each of its packets has too."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import replace
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from katana450.arm.control.session.stopping import SilenceProfile
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.errors import InputError, KatanaError
+from katana450.extensions.motor_bus.bus import MotorBus
 from katana450.extensions.real_arm.arm_modes import ArmModes
+from katana450.extensions.real_arm.link import ArmLink
 from katana450.maths.geometry.arrays import FloatArray
 
 IDLE_TIME = 0.01
@@ -42,24 +44,8 @@ MAX_SETPOINTS = 1000
 log = logging.getLogger(__name__)
 
 
-class DriverLink(Protocol):
-    """A connection to an arm."""
-
-    heard_at: float
-    """Time at which the newest request that the arm has answered was sent [s]."""
-
-    def close(self) -> None:
-        """End the connection. May be called twice."""
-
-
-class _Setpoint(NamedTuple):
-    joints: FloatArray
-    t: float
-    stopped: bool
-
-
 MachineT = TypeVar("MachineT", bound=ArmModes)
-LinkT = TypeVar("LinkT", bound=DriverLink)
+LinkT = TypeVar("LinkT", ArmLink, MotorBus)
 
 
 class DriverThread(ABC, Generic[MachineT, LinkT]):
@@ -74,7 +60,7 @@ class DriverThread(ABC, Generic[MachineT, LinkT]):
         self._link: LinkT | None = None
         self._heard_at = self._clock()
         self._retry, self._retry_at = SHORTEST_RETRY, -np.inf
-        self._setpoints: deque[_Setpoint] = deque(maxlen=MAX_SETPOINTS)
+        self._setpoints: deque[tuple[FloatArray, float, bool]] = deque(maxlen=MAX_SETPOINTS)
         self._acts: deque[ArmAct] = deque()
         self._wake = threading.Event()
         self._ending = threading.Event()
@@ -110,7 +96,7 @@ class DriverThread(ABC, Generic[MachineT, LinkT]):
         joints = np.array([*q, gripper])
         if not np.isfinite(joints).all():
             raise InputError(f"The setpoint must be finite, not {q}, {gripper}.")
-        self._setpoints.append(_Setpoint(joints, t, stopped))
+        self._setpoints.append((joints, t, stopped))
         if stopped and not self._was_stopped:
             self._wake.set()
         self._was_stopped = stopped

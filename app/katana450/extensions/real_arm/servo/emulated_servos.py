@@ -30,9 +30,6 @@ SAG = (0.0, 25.0, 20.0, 8.0, 0.0, 0.0)
 FALL = 600.0
 """[ticks/s] Speed of a limp joint that carries weight."""
 
-OVERLOAD_TIME = 2.0
-"""[s] Time of whole force after which a blocked motor reports overload."""
-
 VOLTS, CELSIUS = 7.4, 30.0
 
 MODEL_STS3215 = 777
@@ -71,7 +68,7 @@ class EmulatedServo:
     def __init__(self, number: int) -> None:
         """Create the motor of that ``number``, from 0, with its torque off."""
         self.place, self.speed = float(START[number]), 0.0
-        self._pressed = self._load = 0.0
+        self._load = 0.0
         self.blocked = self.silent = False
         self.fault = MotorError(0)
         self.volts, self.celsius = VOLTS, CELSIUS
@@ -122,9 +119,6 @@ class EmulatedServo:
         if self.blocked or place == self.place:
             self.speed, place = 0.0, self.place
         self.place = place
-        self._pressed = self._pressed + dt if self.blocked and abs(load) >= force else 0.0
-        if self._pressed > OVERLOAD_TIME:
-            self.fault |= MotorError.OVERLOAD
         self._load = load
 
     def publish(self) -> None:
@@ -135,7 +129,6 @@ class EmulatedServo:
             (reg.PRESENT_LOAD, 1000.0 * self._load),
             (reg.PRESENT_VOLTAGE, 10.0 * self.volts),
             (reg.PRESENT_TEMPERATURE, self.celsius),
-            (reg.STATUS, self.fault),
         ):
             self[register] = round(value)
 
@@ -146,10 +139,7 @@ class EmulatedServos:
     Attributes:
         motors: the motors, from the base to the jaw.
         lost: fraction of the answers that lose a byte.
-        is_calibrating: never; a person calibrates such an arm.
     """
-
-    is_calibrating = False
 
     def __init__(self) -> None:
         """Create an arm that is folded, with its motors off."""
