@@ -3,12 +3,12 @@ import { element, onChoice, styled } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { messageOf, request } from "../server.js";
 
-/** @typedef {{ name: string, title: string, kind: "own" | "first" | "uploaded" | "gallery", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
+/** @typedef {{ name: string, title: string, kind: "own" | "first" | "uploaded" | "gallery" | "other", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
 
 const box = element("robots", HTMLDialogElement);
 styled("robots.css", import.meta.url);
 
-const KINDS = { own: "Of this app", first: "With which the server began", uploaded: "Opened here", gallery: "Gallery" };
+const KINDS = { own: "Of this app", first: "With which the server began", uploaded: "Opened here", gallery: "Arms of the gallery, downloaded when first chosen", other: "Other robots of the gallery" };
 const PATH = "api/v1/robots";
 
 const search = html("input", { type: "search", placeholder: "Name or maker", "aria-label": "Search a robot" });
@@ -63,11 +63,14 @@ function ask(robot, isDropped = false) {
   };
 }
 
+/** Return the letters and digits of `words`, so that "SO-101" is "so101". @param {string} words */
+const plain = (words) => words.toLowerCase().replace(/[^\p{L}\d]/gu, "");
+
 function draw() {
-  const words = search.value.trim().toLowerCase().split(/\s+/);
-  const matches = robots.filter((robot) => words.every((word) => `${robot.name} ${robot.title} ${robot.maker ?? ""}`.toLowerCase().includes(word)));
+  const words = search.value.split(/\s+/).map(plain);
+  const matches = robots.filter((robot) => words.every((word) => plain(`${robot.name} ${robot.title} ${robot.maker ?? ""}`).includes(word)));
   list.replaceChildren();
-  for (const kind of /** @type {const} */ (["own", "first", "uploaded", "gallery"])) {
+  for (const kind of /** @type {const} */ (["own", "first", "uploaded", "gallery", "other"])) {
     const group = matches.filter((robot) => robot.kind === kind);
     if (group.length) list.append(html("h2", {}, KINDS[kind]));
     for (const robot of group) {
@@ -128,6 +131,7 @@ export async function toggle(options) {
   report(driven?.problem ?? "");
   details.hidden = true;
   if (!box.open) box.show();
+  search.focus();
   await load();
   if (options.file) upload(options.file, "", true);
 }

@@ -18,14 +18,15 @@ class Description:
     repository: str
     license_spdx: str
     license_file: str
+    tags: tuple
 
     @property
     def has_urdf(self):
         return "urdf" in self.formats
 
 
-def _arm(robot, maker, licence="BSD-3-Clause", formats=("urdf",), repository="arms"):
-    return Description(formats, robot, maker, repository, licence, "LICENSE")
+def _arm(robot, maker, licence="BSD-3-Clause", formats=("urdf",), repository="arms", tags=("arm",)):
+    return Description(formats, robot, maker, repository, licence, "LICENSE", tags)
 
 
 DESCRIPTIONS = {
@@ -35,7 +36,7 @@ DESCRIPTIONS = {
     "panda_description": _arm("Panda", "Franka Robotics"),
     "xarm6_description": _arm("xArm6", "UFACTORY"),
     "open_manipulator_x_description": _arm("OpenMANIPULATOR-X", "ROBOTIS"),
-    "allegro_hand_description": _arm("Allegro Hand", None, "BSD", repository="elsewhere"),
+    "allegro_hand_description": _arm("Allegro Hand", None, "BSD", repository="elsewhere", tags=()),
     "iiwa14_description": _arm("iiwa 14", "KUKA"),
     "sawyer_description": _arm("Sawyer", "Rethink Robotics"),
     "yam_mj_description": _arm("YAM", "I2RT", formats=("mjcf",)),

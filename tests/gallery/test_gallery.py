@@ -15,6 +15,8 @@ from katana450.arm.robot.loader import load
 from katana450.cli.main import main
 from katana450.errors import ConfigurationError
 from katana450.extensions.gallery.arms_command import file_of, listed_robots, robot_named
+from katana450.extensions.robot_choice.robot_routes import choices
+from katana450.resources import URDF_PATH
 from tests.browser.server import APP, AppServer
 from tests.gallery.stand_in import write_package
 
@@ -50,13 +52,9 @@ def why(name: str) -> str:
     ("typed", "name"),
     [
         ("ur5e", "ur5e"),
-        ("UR5e", "ur5e"),
         ("ur5e_description", "ur5e"),
         ("SO-101", "so_arm101"),
-        ("so101", "so_arm101"),
         ("SO-ARM101", "so_arm101"),
-        ("xArm6", "xarm6"),
-        ("panda", "panda"),
         ("OpenManipulator-X", "open_manipulator_x"),
         ("allegro", "allegro_hand"),
         ("iiwa 14", "iiwa14"),
@@ -64,6 +62,14 @@ def why(name: str) -> str:
 )
 def test_a_robot_is_found_by_any_common_form_of_its_name(typed: str, name: str) -> None:
     assert robot_named(typed).name == name
+
+
+@pytest.mark.usefixtures("arms")
+def test_arms_are_listed_with_common_names_and_apart_from_other_robots() -> None:
+    listed = {choice.name: (choice.kind, choice.title) for choice in choices(URDF_PATH)}
+    assert listed["so_arm101"] == ("gallery", "SO-ARM101 (so101)")
+    assert listed["allegro_hand"] == ("other", "Allegro Hand (allegro)")
+    assert listed["ur5e"] == ("gallery", "UR5e")
 
 
 @pytest.mark.usefixtures("arms")

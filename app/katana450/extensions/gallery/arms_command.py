@@ -50,6 +50,7 @@ class ListedRobot:
         licence_url: address of the text; empty if the package does not give it.
         source: address of the repository; empty if the package does not give it.
         urdf: whether it is a URDF or xacro file.
+        is_arm: whether it is an arm, and not another kind of robot or a hand.
     """
 
     name: str
@@ -59,6 +60,12 @@ class ListedRobot:
     licence_url: str
     source: str
     urdf: bool
+    is_arm: bool
+
+    @property
+    def alias(self) -> str:
+        """Its common name, if that is another one; empty otherwise."""
+        return next((alias for alias, name in ALIASES.items() if name == self.name), "")
 
     @property
     def module(self) -> str:
@@ -109,6 +116,7 @@ def _listed(key: str, description: Any, repositories: Mapping[str, Any]) -> List
         licence_url=f"{url}/blob/{repository.commit}/{file}" if repository and file else "",
         source=url,
         urdf=description.has_urdf,
+        is_arm="arm" in description.tags,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
@@ -46,8 +47,8 @@ class Choice(msgspec.Struct, frozen=True, omit_defaults=True):
         title: Its name for people.
         maker: Its maker; empty if unknown.
         licence: Licence of the description; empty if unknown.
-        kind: "own", "first" for the one with which the server began, "uploaded" or "gallery";
-            those of the gallery may have to be downloaded.
+        kind: "own", "first" for the one with which the server began, "uploaded", or "gallery" for
+            an arm and "other" for another robot of the gallery, which may have to be downloaded.
         arguments: Arguments of a xacro file and their defaults.
     """
 
@@ -79,11 +80,13 @@ def choices(first: Path) -> list[Choice]:
     robots += (_uploaded(name, path) for name, path in uploaded_robots().items())
     # Without the extra there is no gallery.
     with suppress(ConfigurationError):
-        robots += [
-            Choice(robot.name, robot.robot, "gallery", robot.maker, robot.licence)
-            for robot in listed_robots().values()
-            if robot.urdf
-        ]
+        listed = [robot for robot in listed_robots().values() if robot.urdf]
+        titles = Counter(robot.robot for robot in listed)
+        for robot in listed:
+            alias = robot.alias or (robot.name if titles[robot.robot] > 1 else "")
+            title = f"{robot.robot} ({alias})" if alias else robot.robot
+            kind = "gallery" if robot.is_arm else "other"
+            robots.append(Choice(robot.name, title, kind, robot.maker, robot.licence))
     return robots
 
 
