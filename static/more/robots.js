@@ -131,7 +131,7 @@ export async function toggle(options) {
   report(driven?.problem ?? "");
   details.hidden = true;
   if (!box.open) box.show();
-  search.focus();
+  if (matchMedia("(pointer: fine)").matches) search.focus(); // else a keyboard would cover the list
   await load();
   if (options.file) upload(options.file, "", true);
 }
