@@ -105,14 +105,15 @@ def test_values_of_a_step_are_where_the_text_has_them() -> None:
     ("step", "names"),
     [
         ("line: {to: [1, 2, 3]}", ["to x", "to y", "to z"]),
-        ("joints: [1, 2, 3]", ["1", "2", "3"]),
+        ("joints: [1.25, 2, 3]", ["base", "arm", "wrist"]),
         ("move: up", ["move"]),
         ("home:", []),
         ("fly: {at: 3}", ["at"]),
     ],
 )
 def test_values_have_the_names_of_the_schema(step: str, names: list[str]) -> None:
-    poses, block = blocks(f"poses: {{up: {{joints: [1]}}}}\nsteps: [{step}]\n")
+    text = f"poses: {{up: {{joints: [1]}}}}\nsteps: [{step}]\n"
+    poses, block = blocks_of(read(text), text, {"axes": ("base", "arm", "wrist")})
     assert [value.name for value in poses.values] == ["up joints 1"]
     assert [value.name for value in block.values] == names
     assert {value.options for value in block.values if value.name == "move"} <= {("up",)}

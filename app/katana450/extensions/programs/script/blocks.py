@@ -160,5 +160,6 @@ def _words(value: YamlValue) -> str:
         fields = (field for field in value.fields if field[0].held not in STEP_LISTS)
         text = ", ".join(f"{_words(name)} {_words(held)}".strip() for name, held in fields)
     elif value.kind == "list":
-        text = f"({', '.join(map(_words, value.items))})"
+        items = (f"{x.number:.1f}" if x.kind == "number" else _words(x) for x in value.items)
+        text = f"({', '.join(items)})"
     return textwrap.shorten(text, MAX_TITLE, placeholder=" …")

@@ -85,7 +85,9 @@ def values_of(
         # A point may be given by its components, in the same order.
         mappings = (tuple(kind.get("properties", ())) for kind in variants)
         numbers = tuple(str(number) for number in range(1, len(value.items) + 1))
-        words = next((keys for keys in mappings if len(keys) == len(numbers)), numbers)
+        is_posture = any(kind == {**kind, **reference("joints")} for kind in variants)
+        lists = (*mappings, tuple(names.get("axes", ())) if is_posture else ())
+        words = next((keys for keys in lists if len(keys) == len(numbers)), numbers)
         for inner, key in zip(value.items, words, strict=True):
             yield from values_of(inner, items, names, f"{prefix}{key}", f"{prefix}{key} ")
     elif value.end and schema.get("type") != "null":

@@ -74,6 +74,7 @@ class ScriptRoutes:
         arm = self._context.hub.arm
         names: dict[str, Iterable[str]] = {}
         if arm is not None:
+            names["axes"] = arm.robot.joint_labels
             names["objects"] = [body.name for body in arm.state.objects]
             names["tools"] = () if arm.robot.arm is None else arm.robot.arm.tools
 
