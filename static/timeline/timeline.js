@@ -118,7 +118,7 @@ export class Timeline {
     if (this.#t === null) return;
     this.#t = null;
     this.#hidden = false;
-    this.#scene?.hideNodes(null);
+    sceneOf(this.#page.scene)?.hideNodes(null);
     this.#part.showPast(false);
     this.#grow(this.#pinned);
     api.hide(this.#page.name).catch(() => {});
@@ -265,7 +265,7 @@ export class Timeline {
       while (this.#t !== null && this.#t !== asked) {
         asked = this.#t;
         const { moving } = await api.show({ page: this.#page.name, of: this.#of, t: asked, ...this.#secondAt(asked) });
-        if (this.#t !== null && !this.#hidden) this.#scene?.hideNodes((name) => PRESENT.test(name) || moving.includes(name));
+        if (this.#t !== null && !this.#hidden) sceneOf(this.#page.scene)?.hideNodes((name) => PRESENT.test(name) || moving.includes(name));
         this.#hidden = this.#t !== null;
       }
     } catch (error) {
@@ -321,10 +321,6 @@ export class Timeline {
     const part = this.#selected();
     if (part) this.live();
     this.#selection.runAgain(part);
-  }
-
-  get #scene() {
-    return sceneOf(this.#page.scene);
   }
 
   #draw() {
