@@ -1,6 +1,6 @@
 // The chosen object in the sheet of objects: its looks, size and rotation, what carries it, and the rule for the arm in a zone.
 import { onClick, repeating, styled, write } from "../dom.js";
-import { button, html, set } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 import { readObjects } from "../server.js";
 
 const EVERY = 1000; // ms between two looks at the objects, which others change too
@@ -21,9 +21,6 @@ const NEW_PLANE = /** @type {Partial<Api.Place>} */ ({ shape: "plane", size: [0.
 
 /** What the numbers of a size are, of shapes other than boxes. @type {Record<string, string>} */
 const SIZES = { sphere: "Radius, mm", cylinder: "Radius × height, mm", vessel: "Radius × height, mm" };
-
-/** Return the rotation of an object about the vertical [degrees]. @param {number[][]} T */
-const turnOf = (T) => Math.round(Math.atan2(T[1][0], T[0][0]) * DEGREES) + 0;
 
 /** Return the pose `T` turned by `angle` [degrees] about the vertical through it. @param {number[][]} T @param {number} angle */
 function turned(T, angle) {
@@ -51,7 +48,8 @@ export class ObjectForm {
   #turn = this.#input("turn", { type: "range", min: -180, max: 180, step: 1 }, (value) => this.#turned(Number(value)));
   #hidden = html("input", { type: "checkbox" });
   #values = { opacity: html("output"), turn: html("output") };
-  element = html("fieldset", { id: "object", "aria-label": "Chosen object", title: "" });
+  #why = html("p", { role: "status" });
+  element = html("fieldset", { id: "object", "aria-label": "Chosen object" });
 
   /** @param {Page.Say} say */
   constructor(say) {
@@ -66,7 +64,9 @@ export class ObjectForm {
     onClick("add-zone", () => this.#addZone("zone", NEW_ZONE));
     onClick("add-plane", () => this.#addZone("plane", NEW_PLANE));
     this.element.append(
-      html("div", {}, this.#choice, this.#remove),
+      // What is in the legend stays in use while the rest is not.
+      html("legend", {}, this.#choice, this.#remove),
+      this.#why,
       html("div", {}, row("Colour", this.#colour), this.#own),
       row("Opacity", this.#opacity, this.#values.opacity),
       html("label", {}, this.#sizeLabel, this.#size),
@@ -162,10 +162,10 @@ export class ObjectForm {
     write(this.#sizeLabel, SIZES[object.shape] ?? "Size, mm");
     this.#size.readOnly = object.shape === "mesh";
     this.#zone.value = zone ?? "none";
-    this.#turn.value = String(turnOf(T));
+    this.#turn.value = String(Math.round(Math.atan2(T[1][0], T[0][0]) * DEGREES) + 0);
     this.#hidden.checked = hidden;
-    this.element.disabled = held;
-    set(this.element, "title", held ? "It is held: open the gripper first" : "");
+    this.element.disabled = this.#remove.disabled = held;
+    write(this.#why, held ? "It is held: open the gripper first" : "");
     this.#write();
   }
 
