@@ -62,9 +62,7 @@ function stop() {
   parts.timeline?.live();
 }
 
-function showLink() {
-  drawLink(page, stopPress.unanswered);
-}
+const showLink = () => drawLink(page, stopPress.unanswered);
 
 // Stop at the press, not at the release. A click without a pointer is the Enter key.
 const stopButton = element("stop", HTMLButtonElement);
