@@ -7,6 +7,7 @@ import { draggable } from "./order.js";
 import { drawn } from "./row.js";
 import { Values } from "./values.js";
 
+const COMMON = ["wait", "gripper", "place", "grasp", "line"]; // steps that the menu shows first, from the last one
 const CURRENT = ["shown", "now", "ended here"]; // marks
 const LOCKED = "This step shares its line with others. Move it in the text.";
 const NEEDED = "Its list needs one step. Insert another one first, or change the step around it.";
@@ -137,7 +138,7 @@ export class Steps {
   #open(on) {
     this.#menu.hidden = !on;
     set(this.#buttons.add, "aria-expanded", on);
-    const examples = Object.entries(this.#sheet.scripts.examples);
+    const examples = Object.entries(this.#sheet.scripts.examples).sort(([a], [b]) => COMMON.indexOf(b) - COMMON.indexOf(a));
     if (!on || this.#menu.childElementCount || !examples.length) return;
     const pose = button("present pose", async () => this.#insert(await this.#sheet.pose()), { title: "joints: the angles of the present goal" });
     const others = examples.map(([word, step]) => button(word.replaceAll("_", " "), () => this.#insert(step), { title: step }));

@@ -28,8 +28,8 @@ export class Values {
       if (field.text !== text) field.input.value = field.text = text;
       set(field.input, "title", about);
       write(field.unit, step ? unit : "");
-      const problem = problems.find((other) => other.line === line && other.column === column);
-      write(field.why, problem?.text ?? "");
+      const problem = problems.find((other) => other.line === line && (other.column === column || (!other.column && values.length === 1)));
+      write(field.why, (problem?.column && problem.text) || "");
       set(field.input, "aria-description", field.why.textContent ?? "");
       set(field.input, "aria-invalid", Boolean(problem));
     });
