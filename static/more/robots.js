@@ -63,8 +63,7 @@ function ask(robot, isDropped = false) {
   };
 }
 
-/** Return the letters and digits of `words`, so that "SO-101" is "so101". @param {string} words */
-const plain = (words) => words.toLowerCase().replace(/[^\p{L}\d]/gu, "");
+const plain = (/** @type {string} */ words) => words.toLowerCase().replace(/[^\p{L}\d]/gu, ""); // "SO-101" is "so101"
 
 function draw() {
   const words = search.value.split(/\s+/).map(plain);

@@ -76,7 +76,7 @@ export class Joints {
   /** Show that the pointer can take hold of a joint; null for none. @param {number | null} joint @param {Page.Pixel | null} pixel */
   hover(joint, pixel) {
     if (this.#drag) return;
-    const shown = this.#mayDrive() ? joint : null;
+    const shown = this.mayDrive ? joint : null;
     if (shown !== this.#hovered) {
       this.#hovered = shown;
       this.#light();
@@ -89,7 +89,7 @@ export class Joints {
   // the selected one, and so does a person who does not drive: the refusal then has a reason to be shown.
   /** @param {number | null} joint @param {boolean} touch @returns {joint is number} */
   takes(joint, touch) {
-    return joint !== null && !this.#drag && (joint === this.#selected || (!touch && this.#mayDrive()));
+    return joint !== null && !this.#drag && (joint === this.#selected || (!touch && this.mayDrive));
   }
 
   // Take hold of a joint at a hit {point} of the ray from a pixel.
@@ -254,7 +254,7 @@ export class Joints {
   }
 
   // Whether a drag of this person would be accepted if the arm is not stopped.
-  #mayDrive() {
+  get mayDrive() {
     const status = this.#page.store.live;
     return Boolean(status && status.role !== "viewer" && (status.mine || status.own_program || status.holder === null));
   }

@@ -58,21 +58,21 @@ export class Stage {
     scene.addEventListener("load", () => this.#listen());
     // What is held at a stop, or when another person drives, moves nothing afterwards.
     let stopped = Boolean(page.store.status?.stopped);
-    this.#fade(stopped);
     page.store.follow((status) => {
       // While the arm is stopped, a new drag is refused with the reason.
       const stops = status.stopped && !stopped;
       stopped = Boolean(status.stopped);
-      this.#fade(stopped);
-      if (stops || !(status.mine || status.own_program || status.holder === null)) this.drop();
+      this.#fade();
+      if (stops || !this.joints.mayDrive) this.drop();
     });
     document.addEventListener("visibilitychange", () => document.hidden && this.joints.lose());
     window.addEventListener("blur", () => this.#blur());
   }
 
-  /** Show in the panel whether its buttons move the arm. @param {boolean} stopped */
-  #fade(stopped) {
-    this.#scene.contentDocument?.documentElement.toggleAttribute("data-stopped", stopped);
+  // Show in the panel whether its controls move the arm.
+  #fade() {
+    const refused = !this.joints.mayDrive || Boolean(this.#page.store.status?.stopped);
+    this.#scene.contentDocument?.documentElement.toggleAttribute("data-refused", refused);
   }
 
   async #load() {
@@ -116,6 +116,7 @@ export class Stage {
     this.handle.listen(inner);
     on("dblclick", this.#focus);
     this.#branches?.listen(inner);
+    this.#fade();
   }
 
   // The focus may only have moved between the two documents.

@@ -39,6 +39,8 @@ def test_arm_is_handed_over(
     other = open_page(server.url, nodes=("/arm", MOVE))
     me, they = (bar(window, "name").partition(",")[0] for window in (page, other))
     other.wait_until(lambda: bar(other, "holder") == f"{me} drives", "who drives")
+    grey = "document.documentElement.hasAttribute('data-refused')"
+    assert [window.frame.evaluate(grey) for window in (page, other)] == [False, True]
     # A control of a person who does not drive springs back, and the reason is shown.
     before = other.slider_value("1 base turn")
     other.drag_slider("1 base turn", 40.0)
