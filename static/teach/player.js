@@ -42,11 +42,11 @@ export class Player {
     const { now } = sheet.content;
     const isText = now.text !== null;
     if (isText && (await sheet.editor.check())?.problems.length) return sheet.report("The script is not run: see the lines below.", true);
-    const script = sheet.script().text;
+    const { text } = sheet.script();
     /** The index of the pose of a line; null for another line. @param {number} line */
     const poseAt = (line) => (isText ? null : scriptOf(now).poseAt(line));
     sheet.report("Planning …");
-    const program = await this.run.play(script, order, revocations, ({ status, fraction, line, task }) => {
+    const program = await this.run.play(text, order, revocations, ({ status, fraction, line, task }) => {
       if (status === PLANNING) return sheet.report(`Planning ${Math.round(100 * fraction)} %`);
       const index = poseAt(line);
       if (index !== null) sheet.mark(now.poses[index].id);
@@ -57,9 +57,9 @@ export class Player {
     else sheet.report(status === "done" ? "Done." : why.split("\n")[0] || "It was ended.", status !== "done");
     const problems = problemsOf(why);
     if (!problems.length) return;
-    const pose = poseAt(problems[0].line);
     sheet.editor.explain(problems);
-    const text = pose === null ? problems[0].text : `Pose ${pose + 1}: ${problems[0].text}`;
-    sheet.report(isText && status === "refused" ? "The script is not run: see the lines below." : text, true);
+    if (isText && status === "refused") return sheet.report("The script is not run: see the lines below.", true);
+    const pose = poseAt(problems[0].line);
+    sheet.report(pose === null ? problems[0].text : `Pose ${pose + 1}: ${problems[0].text}`, true);
   }
 }

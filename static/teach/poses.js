@@ -24,12 +24,12 @@ export function poseOf(state, arm, picture) {
   return made({ joints, gripper: fingersOf(state, arm), grips: Boolean(arm.gripper), picture });
 }
 
-/** Return where the fingers of a state are [deg or mm], closed if they hold something; null without fingers. @param {Api.State} state @param {Api.Arm} arm */
+/** Return where the fingers of a state are [deg or mm], closed if they hold; null without fingers. @param {Api.State} state @param {Api.Arm} arm */
 export function fingersOf(state, arm) {
   if (!arm.gripper) return null;
   const unit = arm.gripper_slides ? 1000 : 180 / Math.PI;
   const [low, high] = arm.gripper.slice(0, 2).sort((a, b) => a - b);
-  // Where they met the object, rounded, could be a little wider and drop it.
+  // Rounded, it could be wider.
   return within((state.held ? arm.gripper[0] : state.gripper_goal) * unit, low * unit, high * unit);
 }
 

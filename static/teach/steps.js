@@ -7,7 +7,7 @@ import { draggable } from "./order.js";
 import { drawn } from "./row.js";
 import { Values } from "./values.js";
 
-const COMMON = ["wait", "gripper", "place", "grasp", "line"]; // steps that the menu shows first, from the last one
+const COMMON = ["wait", "gripper", "place", "grasp", "line"]; // first in the menu
 const CURRENT = ["shown", "now", "ended here"]; // marks
 const LOCKED = "This step shares its line with others. Move it in the text.";
 const NEEDED = "Its list needs one step. Insert another one first, or change the step around it.";
