@@ -36,7 +36,7 @@ expect: {}
 
 
 def blocks(text: str) -> tuple[TextBlock, ...]:
-    return blocks_of(read(text), text)
+    return blocks_of(read(text), text, {"axes": ("base", "arm", "wrist")})
 
 
 def test_blocks_have_their_lines_and_the_comments_above_them() -> None:
@@ -112,8 +112,7 @@ def test_values_of_a_step_are_where_the_text_has_them() -> None:
     ],
 )
 def test_values_have_the_names_of_the_schema(step: str, names: list[str]) -> None:
-    text = f"poses: {{up: {{joints: [1]}}}}\nsteps: [{step}]\n"
-    poses, block = blocks_of(read(text), text, {"axes": ("base", "arm", "wrist")})
+    poses, block = blocks(f"poses: {{up: {{joints: [1]}}}}\nsteps: [{step}]\n")
     assert [value.name for value in poses.values] == ["up joints 1"]
     assert [value.name for value in block.values] == names
     assert {value.options for value in block.values if value.name == "move"} <= {("up",)}
