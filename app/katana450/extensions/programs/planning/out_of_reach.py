@@ -197,11 +197,6 @@ def near_places(
         yield f"{{{text}}}", replace(place, **turned)
 
 
-def _smallest(target: ToolTarget) -> float:
-    """Return the smallest distance [m] that is reported: a posture by search is less exact."""
-    return EXACT if target.is_pitched else POSITION_WORTH_TELLING
-
-
 def _missed(nearest: NearestPlace) -> str:
     """Return by how much the target is missed, in words; "" if it is not."""
     best, missed = nearest.projection, []
@@ -209,7 +204,9 @@ def _missed(nearest: NearestPlace) -> str:
         return (
             f"this pitch is {math.degrees(best.pitch_error):.1f} deg beyond what the arm can have"
         )
-    if best.position_error > _smallest(nearest.target):
+    # A posture by search is less exact.
+    smallest = EXACT if nearest.target.is_pitched else POSITION_WORTH_TELLING
+    if best.position_error > smallest:
         missed.append(f"it is {millimetres(best.position_error)} out of reach")
     if nearest.target.is_pitched:
         roll = f"the roll is {math.degrees(best.roll_error):.1f} deg beyond what the arm can have"

@@ -45,7 +45,8 @@ class Scripts:
     @property
     def paths(self) -> Mapping[str, Path]:
         """Paths of the scripts by name; those of the folder come first and have precedence."""
-        paths = {_shown(path): path for path in sorted(LIBRARY.glob(f"*{ENDING}"))}
+        library = sorted(LIBRARY.glob(f"*{ENDING}"))
+        paths = {path.stem.replace("_", " ").capitalize(): path for path in library}
         if self._folder is not None:
             own = sorted(self._folder.glob(f"*{ENDING}"))[:MAX_SCRIPTS]
             paths = {**{path.stem: path for path in own}, **paths}
@@ -104,7 +105,3 @@ def script_text(path: Path) -> str:
         return bytes_of(path, MAX_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8 text: {error.reason}.") from error
-
-
-def _shown(path: Path) -> str:
-    return path.stem.replace("_", " ").capitalize()

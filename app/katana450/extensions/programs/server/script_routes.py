@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import msgspec
+import numpy as np
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route
 
+from katana450.arm.control.arm import NO_GRIPPER, GripperModel
 from katana450.arm.control.lease import CommandChannel
 from katana450.errors import InputError
-from katana450.extensions.programs.language.source import MAX_BYTES, ScriptError, read
-from katana450.extensions.programs.script.blocks import blocks_of
+from katana450.extensions.programs.language.source import MAX_BYTES, Problem, ScriptError, read
+from katana450.extensions.programs.script.blocks import TextBlock, blocks_of
 from katana450.extensions.programs.script.script import examples, parse, script_of, script_schema
 from katana450.extensions.programs.script.script_files import Scripts
-from katana450.extensions.programs.script.teach import taught
+from katana450.extensions.programs.script.teach import DIGITS, taught
 from katana450.server.api.fields import ROOT
 from katana450.server.service.participants import actor_of
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, body_of
@@ -73,8 +77,13 @@ class ScriptRoutes:
         """Return problems of a text by line, its blocks if it is YAML, and its poses if all are."""
         arm = self._context.hub.arm
         names: dict[str, Iterable[str]] = {}
+        axes: dict[str, list[float]] = {}
+        gripper = NO_GRIPPER
         if arm is not None:
-            names["axes"] = arm.robot.joint_labels
+            model = arm.robot.arm or arm.robot.joint_group
+            gripper, limits = model.gripper, model.limits
+            ends = np.degrees((limits.lower, limits.upper)).T.round(DIGITS).tolist()
+            names["axes"] = axes = dict(zip(arm.robot.joint_labels, ends, strict=True))
             names["objects"] = [body.name for body in arm.state.objects]
             names["tools"] = () if arm.robot.arm is None else arm.robot.arm.tools
 
@@ -82,8 +91,10 @@ class ScriptRoutes:
             answer: dict[str, Any] = {"problems": (), "taught": None, "blocks": None}
             try:
                 value = read(text)
-                answer["blocks"] = blocks_of(value, text, names)
+                blocks = blocks_of(value, text, names)
+                answer["blocks"] = [_as_shown(block, gripper) for block in blocks]
                 answer["taught"] = taught(script_of(value))
+                answer["problems"] = tuple(_beyond(blocks, axes))
             except ScriptError as error:
                 answer["problems"] = error.problems
             return _json(answer)
@@ -135,6 +146,26 @@ def routes(context: RouteContext) -> list[BaseRoute]:
     """Return the routes of the scripts of the library and of the folder of ``--programs``."""
     folder = getattr(context.options, "programs", None)
     return ScriptRoutes(context, Scripts(folder)).routes()
+
+
+def _as_shown(block: TextBlock, gripper: GripperModel) -> TextBlock:
+    """Return ``block`` with a place of the fingers in percent, as the panel shows it."""
+    place = block.values[0] if block.values else None
+    if place is None or place.name != "gripper" or not (place.step and gripper.moves):
+        return block
+    angle = float(place.text) * (1e-3 if gripper.slides else math.radians(1.0))
+    opening = 100.0 * (angle - gripper.closed) / (gripper.opened - gripper.closed)
+    return replace(block, title=block.title.replace(place.text, f"{opening:.1f} %"))
+
+
+def _beyond(blocks: Iterable[TextBlock], axes: Mapping[str, Sequence[float]]) -> Iterator[Problem]:
+    """Yield the angles in ``blocks`` that are beyond the ends of their ``axes`` [deg]."""
+    for value in (value for block in blocks if block.enabled for value in block.values):
+        if value.step and value.name in axes:
+            low, high = axes[value.name]
+            if not low <= float(value.text) <= high:
+                why = f"{value.text} is not between {low:g} and {high:g} deg."
+                yield Problem(value.line, value.column, why)
 
 
 @cache
