@@ -23,6 +23,9 @@ NAMED = "named"
 REPEATED = 1.0
 """[s] Time in which a mark with the same text is left out."""
 
+TOUCHED = 10.0
+"""[s] The same for a contact of the same parts, however near they are."""
+
 SAME_BEGIN = 5.0
 """[s] Time after the begin of a script in which the arm moves first, if the mark is that begin."""
 
@@ -54,8 +57,10 @@ def add_marks(marks: list[Mark], messages: Iterable[Message]) -> None:
             if stops:
                 marks[stops[-1]] = marks[stops[-1]]._replace(text=mark.text)
             continue
-        again = (old for old in reversed(marks) if mark.t - old.t < REPEATED)
-        if not any(old[1:] == mark[1:] for old in again):
+        time = TOUCHED if mark.kind == "contact" else REPEATED
+        again = (old for old in reversed(marks) if mark.t - old.t < time)
+        words = mark._replace(t=0.0, text=mark.text.partition(" are ")[0])
+        if words not in (old._replace(t=0.0, text=old.text.partition(" are ")[0]) for old in again):
             marks.append(mark)
 
 
