@@ -237,14 +237,10 @@ def _keep(state_publisher: StatePublisher, supervisor: SupervisorPipe) -> None:
         if last is None or state.objects is not last.objects:
             sent = supervisor.keep(SCENE, pickle.dumps(state.objects))
         if state is not last:
-            sent = supervisor.keep(KEPT, _packed(state)) and sent
+            sent = supervisor.keep(KEPT, pickle.dumps(replace(at_rest(state), objects=()))) and sent
         last = state if sent else None
         if last is not None:
             state_publisher.wait_for_change(snapshot, IDLE_INTERVAL, supervisor.ended.is_set)
-
-
-def _packed(state: State) -> bytes:
-    return pickle.dumps(replace(at_rest(state), objects=()))
 
 
 def _unpacked(content: dict[bytes, bytes]) -> State | None:

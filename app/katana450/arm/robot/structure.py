@@ -96,7 +96,8 @@ def structure_of(
     carried = {
         link: len(tree.joints_to(link))
         for link in urdf.links
-        if tree.movable_to(link) == axes and all(_carries(j, axes) for j in tree.joints_to(link))
+        if tree.movable_to(link) == axes
+        and all(j.type in (*TURNING, "fixed") or j is axes[0] for j in tree.joints_to(link))
     }
     named = [link for frame in TOOL_FRAMES for link in carried if _is_called(link, frame)]
     if tool is not None:
@@ -171,10 +172,6 @@ def _moves(joint: Joint) -> bool:
 
 def _drives(joint: Joint) -> bool:
     return _moves(joint) and joint.mimic is None
-
-
-def _carries(joint: Joint, axes: Sequence[Joint]) -> bool:
-    return joint.type in (*TURNING, "fixed") or joint is axes[0]
 
 
 def _is_driven(axes: Sequence[Joint], count: int | None) -> bool:

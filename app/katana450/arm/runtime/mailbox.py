@@ -144,7 +144,7 @@ class Mailbox:
             elif self._waiting and command.replaces(self._waiting[-1].command):
                 self._waiting.pop()
                 replaced = self._of_waiting.pop()
-            elif len(self._waiting) >= CAPACITY and not _pauses(command):
+            elif len(self._waiting) >= CAPACITY and not isinstance(command, HoldFor | PauseFor):
                 raise InputError(f"{CAPACITY} commands are waiting already: send them slower.")
             self._tickets += 1
             self._waiting.append(Submission(command, actor))
@@ -167,7 +167,3 @@ class Mailbox:
         """The ticket of the newest command."""
         with self._lock:
             return self._tickets
-
-
-def _pauses(command: Command) -> bool:
-    return isinstance(command, HoldFor | PauseFor)

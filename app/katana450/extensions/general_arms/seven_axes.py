@@ -214,7 +214,8 @@ class SevenAxes(Kinematics):
         alpha = arm_angles + links.shift[locked]
         before, columns_before = None, np.empty(0)
         if locked == 2:
-            solve, places = _around_third(links, f, alpha), (0, 1, 3, 4, 5, 6)
+            solve = crossing_shoulder(_six_of(links), f, arm_angle_link(links, alpha))
+            places = (0, 1, 3, 4, 5, 6)
         else:
             solve, places = _after_first(links, f), (1, 2, 3, 4, 5, 6)
             before = self._first_link @ _turned_back(alpha)
@@ -345,11 +346,6 @@ class SevenAxes(Kinematics):
             cost += CONTINUITY * np.abs(q.T - hint).max(axis=-1)
         cost[np.isnan(cost)] = math.inf
         return cost
-
-
-def _around_third(links: DHLinks, f: Operations, alpha: FloatArray) -> Solve:
-    """Return the solver of the axes beside the third, which is turned by `alpha` (N,) [rad]."""
-    return crossing_shoulder(_six_of(links), f, arm_angle_link(links, alpha))
 
 
 @lru_cache(maxsize=64)

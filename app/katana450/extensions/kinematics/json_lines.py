@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Mapping
@@ -204,7 +205,7 @@ class JsonKinematics:
                 }
                 for solution in solutions
             ],
-            "residual_mm": 1e3 * max(_distance(T, T_q) for T_q in reached),
+            "residual_mm": 1e3 * max(math.dist(T[:3, 3], T_q[:3, 3]) for T_q in reached),
             "residual_rad": max(so3.angle(T[:3, :3], T_q[:3, :3]) for T_q in reached),
             "rotation_misfit": misfit,
         }
@@ -300,7 +301,3 @@ def _request(line: str) -> Mapping[str, Any]:
     if not isinstance(request, dict):
         raise InputError(f"This is {shown(request)}; a request is a JSON object.")
     return request
-
-
-def _distance(a: FloatArray, b: FloatArray) -> float:
-    return float(np.linalg.norm(a[:3, 3] - b[:3, 3]))

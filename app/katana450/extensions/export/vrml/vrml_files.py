@@ -181,7 +181,7 @@ def _link(writing: _Writing, link: Link, values: Mapping[str, float]) -> Node:
         *(_link(writing, other, values) for other in robot.children(link)),
     ]
     if link.joint is None:
-        return _group(contents) if len(contents) > 1 else contents[0]
+        return Node("Group", (("children", contents),)) if len(contents) > 1 else contents[0]
     axis = robot.axis(link.joint)
     name, value = writing.names.joints[link.joint.name], values[link.joint.name]
     if link.joint.slides:
@@ -195,10 +195,6 @@ def _link(writing: _Writing, link: Link, values: Mapping[str, float]) -> Node:
 
 def _shifted(by: FloatArray, children: list[Node]) -> Node:
     return Node("Transform", (("translation", _rounded(by, 9)), ("children", children)))
-
-
-def _group(children: Sequence[Node]) -> Node:
-    return Node("Group", (("children", [*children]),))
 
 
 def _placed(writing: _Writing, link: Link) -> Node:

@@ -207,7 +207,7 @@ class EmulatedArm:
             # An arm at rest stays at rest until it is touched.
             if self._rests:
                 return
-            for _ in range(self._steps_at_once()):
+            for _ in range(max(round(self._scale), 1) if self._calibration is not None else 1):
                 self._step()
 
     def touch(self) -> None:
@@ -243,9 +243,6 @@ class EmulatedArm:
     def chosen(self, axis: int) -> tuple[EmulatedAxis, ...]:
         """Return the axis with the number ``axis``, from 1, or all for 0."""
         return self.axes if axis == 0 else (self.axes[axis - 1],)
-
-    def _steps_at_once(self) -> int:
-        return max(round(self._scale), 1) if self._calibration is not None else 1
 
     def _step(self) -> None:
         if self._steps % LOAD_INTERVAL == 0:

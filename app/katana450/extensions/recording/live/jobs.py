@@ -97,7 +97,9 @@ class RecordingJob:
         except (OSError, msgspec.MsgspecError) as error:
             result = JobReport(error=f"The process failed: {error}.")
         if result.words is None:
-            self.status, self.words = JobStatus.FAILED, self._named(result.error or "")
+            # The folder says nothing to the person.
+            why = (result.error or "").replace(f"{self._folder}{os.sep}", "")
+            self.status, self.words = JobStatus.FAILED, why
             return
         self.status, self.fraction, self.words = JobStatus.DONE, 1.0, result.words
         self.made = self._folder / result.file if result.file else None
@@ -122,10 +124,6 @@ class RecordingJob:
                     process.kill()
                 await process.wait()
         return result or JobReport(error=f"It ended with {process.returncode}.")
-
-    def _named(self, text: str) -> str:
-        """Return ``text`` without the folder, which says nothing to the person."""
-        return text.replace(f"{self._folder}{os.sep}", "")
 
     async def _followed(self, process: Process) -> JobReport | None:
         """Take the progress of ``process``; return its result, None if it ended without one."""
