@@ -439,6 +439,14 @@ def test_text_of_poses_is_read_back_as_the_same_poses(page: Page) -> None:
         assert list(program.poses) == wanted, text
 
 
+def test_pose_with_something_in_the_hand_keeps_the_fingers_closed(page: Page) -> None:
+    act = (
+        "({ fingersOf }, held) => fingersOf({ gripper_goal: 0.2, held }, { gripper: [-0.4, 0.3] })"
+    )
+    angles = [module(page, "teach/poses.js", act, held) for held in (None, "cup")]
+    assert angles == pytest.approx([11.459, -22.918], abs=1e-3)
+
+
 KEPT = """({ Content }, text, joints) => {
     const arm = { name: "arm", joints: new Array(joints).fill("") };
     const kept = { getItem: (key) => key === "katana450.teach arm" ? text : null };

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -18,11 +17,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 
 WATER = {"cup_ml", "basin_ml", "air_ml", "spilled_ml", "cup_tilt_deg"}
-
 TEXT = "steps:\n  - nudge: {axis: 5, by: 7}\n  - fill: 100\n  - nudge: {axis: 1, by: 3}\n"
-
-
-WRITTEN = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 def reported(text: str) -> tuple[Planned, Report]:

@@ -46,7 +46,7 @@ START = BLOCK[0].address
 SIZE = sum(register.size for register in BLOCK)
 
 UNITS = np.array((1.0, 1.0, 1e-3, 0.1, 1.0))
-"""What one unit of each of them is."""
+"""Units of these registers: ticks, ticks/s, fraction of the torque, V, degrees C."""
 
 JAW_LIMIT, FULL_LIMIT = 500, 1000
 """[1/1000] The jaw presses with half of its force, as LeRobot lets it."""
