@@ -2,9 +2,11 @@
 import { byId, element, onChoice, save } from "./dom.js";
 import { button } from "./instruments/shape.js";
 import { chooseRobot } from "./more.js";
+import { readObjects } from "./server.js";
 
 const API = "api/v1/";
 const UNREACHABLE = "The server does not answer. Try again.";
+const REMOVED = "The object was removed meanwhile.";
 const ALONE = /\.(stl|ply|glb|3mf|zip)$/i; // what needs no other file
 const TOGETHER = "Files that belong together, such as a .gltf and its .bin, or a folder, are read from a .zip: put them into one.";
 const [ROBOT, ROBOT_INSIDE] = [/\.(urdf|xacro)$/i, /\.(urdf|xacro)/i]; // in a name, and in the names in a .zip file
@@ -31,9 +33,9 @@ function report(words, bad = false) {
 
 /** Send `body` and return the answer. A refusal is shown in the sheet, and null is returned. @param {string} path @param {File} body */
 async function ask(path, body) {
-  /** @type {NodeListOf<HTMLButtonElement | HTMLSelectElement>} */
-  const busy = document.querySelectorAll("#objects button, #objects select");
-  for (const control of busy) control.disabled = true;
+  /** @type {NodeListOf<HTMLElement>} */
+  const parts = document.querySelectorAll("#objects > :not(#read)");
+  for (const part of parts) part.inert = true; // nothing can be removed that the answer would place again
   try {
     const answer = await fetch(API + path, { method: "POST", body });
     const text = await answer.text();
@@ -44,7 +46,7 @@ async function ask(path, body) {
   } catch {
     report(UNREACHABLE, true);
   } finally {
-    for (const control of busy) control.disabled = false;
+    for (const part of parts) part.inert = false;
   }
   return null;
 }
@@ -60,6 +62,7 @@ async function add(again) {
   /** @type {Api.Mesh | null} */
   const mesh = await ask(`mesh?${query}`, file);
   if (!mesh) return;
+  if (again && placed && !(await readObjects()).some(({ name }) => name === placed)) return report(REMOVED);
   // A changed unit applies to the object that is already placed.
   mesh.name = again && placed ? placed : mesh.name;
   const fits = mesh.scale === 1;
