@@ -6,7 +6,6 @@ import { readObjects } from "./server.js";
 
 const API = "api/v1/";
 const UNREACHABLE = "The server does not answer. Try again.";
-const REMOVED = "The object was removed meanwhile.";
 const ALONE = /\.(stl|ply|glb|3mf|zip)$/i; // what needs no other file
 const TOGETHER = "Files that belong together, such as a .gltf and its .bin, or a folder, are read from a .zip: put them into one.";
 const [ROBOT, ROBOT_INSIDE] = [/\.(urdf|xacro)$/i, /\.(urdf|xacro)/i]; // in a name, and in the names in a .zip file
@@ -34,7 +33,7 @@ function report(words, bad = false) {
 /** Send `body` and return the answer. A refusal is shown in the sheet, and null is returned. @param {string} path @param {File} body */
 async function ask(path, body) {
   /** @type {NodeListOf<HTMLElement>} */
-  const parts = document.querySelectorAll("#objects > :not(#read)");
+  const parts = document.querySelectorAll("#objects > :not(p)");
   for (const part of parts) part.inert = true; // nothing can be removed that the answer would place again
   try {
     const answer = await fetch(API + path, { method: "POST", body });
@@ -62,9 +61,10 @@ async function add(again) {
   /** @type {Api.Mesh | null} */
   const mesh = await ask(`mesh?${query}`, file);
   if (!mesh) return;
-  if (again && placed && !(await readObjects()).some(({ name }) => name === placed)) return report(REMOVED);
-  // A changed unit applies to the object that is already placed.
-  mesh.name = again && placed ? placed : mesh.name;
+  if (again && placed) {
+    if (!(await readObjects()).some(({ name }) => name === placed)) return report("");
+    mesh.name = placed; // a changed unit applies to the object that is already placed
+  }
   const fits = mesh.scale === 1;
   report(`${mesh.name}: ${fits ? "" : `placed at the scale ${mesh.scale}, which you can change below. `}${mesh.text}`);
   // A unit that fits replaces a scale that was chosen to fit, but not one that was set for the object.

@@ -17,6 +17,7 @@ from katana450.client.files import LostError, RefusedError
 from katana450.errors import KatanaError
 from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.leader.follower import (
+    SILENCE,
     Action,
     Ease,
     EndEase,
@@ -151,13 +152,14 @@ class LeaderRun:
         """Follow until nobody can ask for it again. Raises KatanaError."""
         # The person who starts the program asks for the first motion.
         confirmed, due = True, time.monotonic()
+        late = due + SILENCE  # By then the leader has to answer for the first time.
         while True:
             posture = await asyncio.to_thread(self._posture)
             for task in (watching, self._easing):
                 if task is not None and task.done():
                     # Raises an error that has ended it.
                     task.result()
-            if self._state is not None:
+            if self._state is not None and (posture is not None or time.monotonic() > late):
                 state, heard = self._state
                 now = time.monotonic()
                 for action in self._follower.step(now, posture, state, heard, confirmed=confirmed):
