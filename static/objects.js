@@ -2,7 +2,6 @@
 import { byId, element, onChoice, save } from "./dom.js";
 import { button } from "./instruments/shape.js";
 import { chooseRobot } from "./more.js";
-import { readObjects } from "./server.js";
 
 const API = "api/v1/";
 const UNREACHABLE = "The server does not answer. Try again.";
@@ -61,10 +60,8 @@ async function add(again) {
   /** @type {Api.Mesh | null} */
   const mesh = await ask(`mesh?${query}`, file);
   if (!mesh) return;
-  if (again && placed) {
-    if (!(await readObjects()).some(({ name }) => name === placed)) return report("");
-    mesh.name = placed; // a changed unit applies to the object that is already placed
-  }
+  // A changed unit applies to the object that is already placed.
+  mesh.name = again && placed ? placed : mesh.name;
   const fits = mesh.scale === 1;
   report(`${mesh.name}: ${fits ? "" : `placed at the scale ${mesh.scale}, which you can change below. `}${mesh.text}`);
   // A unit that fits replaces a scale that was chosen to fit, but not one that was set for the object.
