@@ -4,7 +4,7 @@ import { button, drawing, html, svg } from "../instruments/shape.js";
 import { clock } from "../page/words.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
-const EXPORTS = [["episode", "Episode, without what was rewound"], ["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["html", "HTML page"], ["mp4", "MP4 film"]];
+const EXPORTS = [["episode", "Episode, without what was rewound"], ["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["mp4", "MP4 film"]];
 /** The words of each kind of mark. @type {Record<string, string>} */
 const KINDS = { stop: "Stop", clear_stop: "Stop cleared", driver: "Driver", program: "Script", step: "Motion", restore: "Continuation", contact: "Contact", limit: "Limit", episode: "Episode" };
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };

@@ -397,7 +397,7 @@ def test_selection_is_verified_exported_and_cancelled(
     row.get_by_text(f"Exported katana450.csv: {len(lines) - 1} rows.").wait_for()
     assert exports.input_value() == ""
 
-    exports.select_option(label="HTML page")
+    exports.select_option(label="MP4 film")
     row.get_by_role("button", name="Cancel").click()
     assert not row.is_visible()
     # The server is free for the next one.

@@ -296,7 +296,6 @@ def test_odd_input_is_refused(
         "one view, not 2": (
             run, "--format", "mp4", "--view", "top", "--view", "side", "--out", out,
         ),
-        "must end in .html": (run, "--format", "html", "--out", out),
         "must be even": (run, *lerobot, "--view", "top", "--size", "63x48"),
         "nothing from 900": (run, "--format", "rosbag2", "--out", out, "--from", "900"),
     }.items():  # fmt: skip

@@ -19,7 +19,6 @@ from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.frames import MAX_WINDOW
-from katana450.server.viser_bridge.recording_page import TITLE, titled
 from katana450.server.viser_bridge.themes import LIGHT, set_sky
 from tests.gateway.client import UPRIGHT
 from tests.viser_bridge.internals import sent
@@ -93,12 +92,3 @@ def test_page_is_packed_as_its_loader_unpacks_it() -> None:
         assert gzip.decompress(program.packed) == program.content
         assert b"__viserZstdWasm" in program.content
         assert decoder.content.startswith(b"\0asm")
-
-
-def test_page_of_a_recording_has_the_title_that_is_replaced(server: viser.ViserServer) -> None:
-    with part("<title>Viser</title>"):
-        page = server.get_scene_serializer().as_html()
-        assert page.count(TITLE) == 1
-        changed = titled(page, "A <run>", "A </script>")
-        assert "<title>A &lt;run&gt;</title>" in changed
-        assert "A </script>" not in changed

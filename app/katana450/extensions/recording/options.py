@@ -12,7 +12,6 @@ FORMATS = {
     "csv": "t,theta1,...,gripper in s, rad and m",
     "rosbag2": "a folder that ROS 2 plays as a bag",
     "lerobot": "a folder that LeRobot reads as a dataset, version 3.0",
-    "html": "a page that plays it",
     "mp4": "a film",
 }
 """Formats of exports and what they are."""
@@ -35,7 +34,7 @@ USED = {
     "views": ("lerobot", "mp4"),
     "size": ("lerobot", "mp4"),
     "fps": ("lerobot", "mp4"),
-    "urdf": ("lerobot", "html", "mp4"),
+    "urdf": ("lerobot", "mp4"),
 }
 """Formats that use an option; the others refuse it."""
 

@@ -1,4 +1,4 @@
-"""Recordings as pages that play them, and as films."""
+"""Recordings as films."""
 
 from __future__ import annotations
 
@@ -12,19 +12,16 @@ import numpy.typing as npt
 
 from katana450.arm.control.state.state import State
 from katana450.assembly.robot_session import DescribedRobot
-from katana450.atomic import check_writable, write_files, writer_of
+from katana450.atomic import check_writable
 from katana450.errors import InputError
-from katana450.extensions.export.page import FPS, recorded
 from katana450.extensions.media.film import check_filmable, write_film
 from katana450.extensions.media.picture import check_traceable
 from katana450.extensions.media.stage import Shot, rendering_pool
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import RecordedStates, frame_times
-from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 
-PAGE_SUFFIXES = (".html", ".htm")
 FILM_SUFFIX = ".mp4"
 
 
@@ -53,23 +50,6 @@ class PictureViews:
         """Yield the pictures of all views for each of the ``count`` states."""
         with rendering_pool(self._shots, self._urdf, self._bare, count) as rendered:
             yield rendered(states)
-
-
-def write_page_of(file: RecordingFile, out: Path, times: FloatArray, robot: DescribedRobot) -> int:
-    """Write a page that plays ``file`` at ``times`` (N,) [s]; return their number.
-
-    Raises InputError.
-    """
-    if out.suffix.lower() not in PAGE_SUFFIXES:
-        raise InputError(f"{out} must end in .html.")
-    check_writable(out)
-    reader = RecordedStates(file, robot.session)
-    states = progress(reader.at(times), len(times), out.name)
-    title = f"{robot.robot.name}: {file.path.stem}"
-    page = recorded(robot.robot, robot.session, states, 1.0 / FPS, title)
-    write_files({out: writer_of(page.encode())})
-    report_unknown(reader)
-    return len(times)
 
 
 def write_film_of(

@@ -33,7 +33,7 @@ from katana450.extensions.recording.files.header import (
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.simulation import session_for, verified
-from katana450.extensions.recording.files.table import frame_times, write_csv
+from katana450.extensions.recording.files.table import write_csv
 from katana450.extensions.recording.files.trimming import keep, trim
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.options import (
@@ -248,12 +248,6 @@ def _exported(options: Namespace, file: RecordingFile, start: float, end: float)
             count, what = write_csv(file, out, start, end), "row"
         case "rosbag2":
             count, what = write_bag(file, out, start, end), "message"
-        case "html":
-            from katana450.extensions.export.page import FPS
-            from katana450.extensions.recording.datasets.player_files import write_page_of
-
-            times, robot = frame_times(start, end, int(FPS)), session_for(file, options.urdf)
-            count, what = write_page_of(file, out, times, robot), "state"
         case _:
             count, what = _film(options, file, start, end), "picture"
     return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -32,7 +32,6 @@ from katana450.platform_support import lower_priority
 FORMATS = {
     "csv": ".csv",
     "rosbag2": "",
-    "html": ".html",
     "mp4": ".mp4",
 }
 """Formats of exports, and the ends of their names; a folder is packed."""
