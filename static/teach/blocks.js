@@ -13,7 +13,7 @@
  * A value as a part of a line, see `programs/script/step_values.py`. A number has a `step`; what is `free` need not be one of
  * its options.
  * @typedef {{ name: string, line: number, column: number, end: number, text: string, about?: string, unit?: string, step?: number,
- *   options?: string[], free?: boolean }} Value
+ *   options?: string[], free?: boolean, before?: string, after?: string }} Value what has a `before` is not in the text yet
  */
 /** @typedef {{ line: number, indent: number, group: number, depth: number }} Place before a line, in a list */
 /** @typedef {{ text: string, line: number }} Edit a new text, and the line of the block in it */
@@ -107,12 +107,12 @@ const PLAIN = /^[-+]?[\p{L}\d_.(][\p{L}\d_.()+*/ -]*$/u;
 const OTHER = /^(null|true|false|yes|no|on|off)$/i;
 
 /** Return `text` with other words for a value; they keep its quotes. @param {string} text @param {Value} value @param {string} words */
-export function replaced(text, { line, column, end }, words) {
+export function replaced(text, { line, column, end, before, after = "" }, words) {
   const lines = text.split("\n");
   // Columns count characters, not the units of a text here.
   const row = [...lines[line - 1]];
-  const isPlain = PLAIN.test(words) && !OTHER.test(words) && !"\"'".includes(row[column - 1] ?? " ");
-  row.splice(column - 1, end - column, (column === end ? " " : "") + (isPlain ? words : JSON.stringify(words)));
+  const isPlain = PLAIN.test(words) && !OTHER.test(words) && (before || !"\"'".includes(row[column - 1] ?? " "));
+  row.splice(column - 1, end - column, (before ?? (column === end ? " " : "")) + (isPlain ? words : JSON.stringify(words)) + after);
   lines[line - 1] = row.join("");
   return lines.join("\n");
 }

@@ -7,7 +7,7 @@ import { button, clamp, html, set } from "../instruments/shape.js";
 export class Values {
   element = html("div", { class: "values", role: "group" });
   #shape = ""; // which fields there are
-  /** @type {{ input: HTMLInputElement | HTMLSelectElement, unit: HTMLElement, why: HTMLElement, text: string }[]} */
+  /** @type {{ input: HTMLInputElement | HTMLSelectElement, unit: HTMLElement, why: HTMLElement, text: string, name: string }[]} */
   #fields = [];
   #change;
 
@@ -19,17 +19,19 @@ export class Values {
   /** @param {string} title of the step @param {Value[]} values @param {import("./editor.js").Problem[]} problems of the values */
   show(title, values, problems = []) {
     const shape = JSON.stringify(values.map(({ name, options, step }) => [name, options, step]));
+    const label = this.#fields.find(({ input }) => input === document.activeElement)?.name;
     if (shape !== this.#shape) this.element.replaceChildren(...values.map((value, i) => this.#add(value, i)));
+    if (shape !== this.#shape) this.#fields.find(({ name }) => name === label)?.input.focus();
     this.#shape = shape;
     set(this.element, "aria-label", `Values: ${title}`);
-    values.forEach(({ line, column, text, step, unit = "", about = "" }, i) => {
+    values.forEach(({ line, column, text, before, step, unit = "", about = "" }, i) => {
       const field = this.#fields[i];
       // What is being typed stays.
       if (field.text !== text) field.input.value = field.text = text;
       set(field.input, "title", about);
       write(field.unit, step ? unit : "");
-      const problem = problems.find((other) => other.line === line && (other.column === column || (!other.column && values.length === 1)));
-      write(field.why, (problem?.column && problem.text) || "");
+      const problem = !before && problems.find((other) => other.line === line && (other.column === column || (!other.column && values.length === 1)));
+      write(field.why, (problem && problem.column && problem.text) || "");
       set(field.input, "aria-description", field.why.textContent ?? "");
       set(field.input, "aria-invalid", Boolean(problem));
     });
@@ -40,7 +42,7 @@ export class Values {
     const box = () => html("input", step ? { type: "number", step } : { spellcheck: "false", autocomplete: "off", autocapitalize: "off" });
     const input = options.length && !free ? html("select", {}, ...options.map((word) => new Option(word))) : box();
     const [unit, why] = [html("span"), html("em")];
-    this.#fields[i] = { input, unit, why, text: "" };
+    this.#fields[i] = { input, unit, why, text: "", name };
     input.addEventListener("change", () => {
       const words = input.value.trim();
       input.value = !words ? this.#fields[i].text : step ? String(clamp(Number(words), low, high)) : words;

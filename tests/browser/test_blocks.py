@@ -71,7 +71,7 @@ EDITS = """async ([path, text, blocks]) => {
         list.push({ name: "copy", ...duplicated(text, own) });
         list.push({ name: "off", ...toggled(text, own) });
         if (!isOnly(blocks, i)) list.push({ name: "remove", ...removed(text, own) });
-        for (const value of own.values)
+        for (const value of own.values.filter(({ before }) => !before))
             list.push({ name: "same", text: replaced(text, value, value.text), line: own.line });
         return list.map((edit) => ({ own: i, ...edit }));
     });
@@ -122,15 +122,25 @@ def test_edits_keep_every_other_line_and_the_structure(browser: Browser, name: s
 
 def test_words_for_a_value_have_quotes_where_yaml_needs_them(browser: Browser) -> None:
     with bare_page(browser) as page:
-        for text, words, changed in (
-            ("- grasp: 𝄞 cup # it", "a: b", '- grasp: "a: b" # it'),
-            ("- grasp: 'a b' # it", "c", '- grasp: "c" # it'),
-            ("- wait: 1", "2 * t", "- wait: 2 * t"),
-            ("- wait:", "2", "- wait: 2"),
-            ("- grasp: a", "no", '- grasp: "no"'),
+        for text, i, words, changed in (
+            ("- grasp: 𝄞 cup # it", 0, "a: b", '- grasp: "a: b" # it'),
+            ("- grasp: 'a b' # it", 0, "c", '- grasp: "c" # it'),
+            ("- wait: 1", 0, "2 * t", "- wait: 2 * t"),
+            ("- wait:", 0, "2", "- wait: 2"),
+            ("- grasp: a", 0, "no", '- grasp: "no"'),
+            # The last ones are values that the step does not have yet.
+            ("- grasp: 'a, b' # it", -1, "40", '- grasp: {object: "a, b", height: 40} # it'),
+            ("- pour: {into: basin}", -1, "2", "- pour: {into: basin, shake: 2}"),
+            ("- via:\n    through: [up]", -1, "0.5", "- via:\n    blend: 0.5\n    through: [up]"),
+            (
+                "- line:\n    by: {z: 1}\n    feed: 9",
+                -1,
+                "3",
+                "- line:\n    by: {z: 1}\n    feed: 9\n    yaw: 3",
+            ),
         ):
             (block,) = blocks_of(read(f"steps:\n{text}"), f"steps:\n{text}")
-            own = [f"steps:\n{text}", msgspec.to_builtins(block.values[0]), words]
+            own = [f"steps:\n{text}", msgspec.to_builtins(block.values[i]), words]
             edit = "({ replaced }, own) => replaced(...own)"
             assert module(page, "teach/blocks.js", edit, own) == f"steps:\n{changed}"
 

@@ -14,9 +14,16 @@ from typing import NamedTuple
 
 import msgspec
 
+from katana450.extensions.programs.building.step import STEPS
 from katana450.extensions.programs.language.source import ScriptError, YamlValue, read
 from katana450.extensions.programs.script.script import KNOWN_STEPS, STEP_VALUES, Script
-from katana450.extensions.programs.script.step_values import Names, StepValue, names_in, values_of
+from katana450.extensions.programs.script.step_values import (
+    Names,
+    StepValue,
+    absent_values,
+    names_in,
+    values_of,
+)
 
 STEP_LISTS = ("steps", "then", "else")
 """Names of the fields of a step that hold steps."""
@@ -146,6 +153,8 @@ def _values(step: YamlValue, source: _Source) -> Iterator[StepValue]:
         for value in values_of(held, schema, source.names, _words(name)):
             shift = 2 * (value.line in source.disabled)
             yield msgspec.structs.replace(value, column=value.column + shift, end=value.end + shift)
+        if name.held in STEPS and step.line not in source.disabled:
+            yield from absent_values(held, schema, source.names)
 
 
 def _comment_column(line: str) -> int:

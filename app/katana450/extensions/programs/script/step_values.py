@@ -5,6 +5,8 @@ What a value may be follows from the JSON Schema of its step.
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 
 import msgspec
@@ -21,6 +23,9 @@ FINE_RANGE = 1.0
 
 FINE_STEP = 0.05
 
+PLAIN_TEXT = re.compile(r"[\w .+*/()-]+")
+"""Texts that need no quotes between braces."""
+
 
 class StepValue(msgspec.Struct, frozen=True, omit_defaults=True):
     """A value that a field of an editor replaces.
@@ -34,6 +39,7 @@ class StepValue(msgspec.Struct, frozen=True, omit_defaults=True):
         step: change of a number by a key; 0 if it is no number.
         options: texts that it may be, the present one among them.
         free: whether it may be something else.
+        before, after: texts about a value that the step does not have yet, whose ``text`` is empty.
     """
 
     name: str
@@ -46,6 +52,8 @@ class StepValue(msgspec.Struct, frozen=True, omit_defaults=True):
     step: float = 0.0
     options: tuple[str, ...] = ()
     free: bool = False
+    before: str = ""
+    after: str = ""
 
 
 def names_in(script: YamlValue, known: Names) -> Names:
@@ -92,6 +100,38 @@ def values_of(
             yield from values_of(inner, items, names, f"{prefix}{key}", f"{prefix}{key} ")
     elif value.end and schema.get("type") != "null":
         yield _scalar(value, variants, names, name)
+
+
+def absent_values(value: YamlValue, schema: Schema, names: Names) -> Iterator[StepValue]:
+    """Yield the plain values that the step ``value``, which ``schema`` describes, may also have."""
+    mappings = [kind for kind in _variants(schema) if "properties" in kind]
+    line, column, end, after = value.line, value.column, value.end, ""
+    if value.kind == "mapping":
+        present = tuple(str(key.held) for key, _ in value.fields)
+        first, last = value.fields[0][0], value.fields[-1][1]
+        is_flow = (line, column) != (first.line, first.column)
+        before = ", " if is_flow else "\n" + " " * (first.column - 1)
+        line, column = last.line, last.end
+        if not last.end:
+            line, column, before, after = first.line, first.column, "", before
+        end = column
+    elif value.end and mappings and len(mappings[0]["required"]) == 1:
+        present = tuple(mappings[0]["required"])
+        is_plain = PLAIN_TEXT.fullmatch(str(value.held)) and end - column == len(str(value.held))
+        text = value.held if is_plain else json.dumps(value.held, ensure_ascii=False)
+        before, after = f"{{{present[0]}: {text}, ", "}"
+    else:
+        return
+    mapping = next((kind for kind in mappings if set(present) <= set(kind["properties"])), {})
+    excluded = mapping.get("not", {}).get("required", ())
+    hidden = {*present, *(excluded if set(excluded) & set(present) else ())}
+    for name, part in mapping.get("properties", {}).items():
+        variants = tuple(_variants(part))
+        types = {kind.get("type", "string") for kind in variants if {"type", "enum"} & set(kind)}
+        if types and types <= {"string", "number"} and name not in hidden:
+            empty = YamlValue(line, column, None, "number", end=end)
+            field = _scalar(empty, variants, names, name.replace("_", " "))
+            yield msgspec.structs.replace(field, before=f"{before}{name}: ", after=after)
 
 
 def _scalar(value: YamlValue, variants: Iterable[Schema], names: Names, name: str) -> StepValue:

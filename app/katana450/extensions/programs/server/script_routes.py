@@ -161,7 +161,7 @@ def _as_shown(block: TextBlock, gripper: GripperModel) -> TextBlock:
 def _beyond(blocks: Iterable[TextBlock], axes: Mapping[str, Sequence[float]]) -> Iterator[Problem]:
     """Yield the angles in ``blocks`` that are beyond the ends of their ``axes`` [deg]."""
     for value in (value for block in blocks if block.enabled for value in block.values):
-        if value.step and value.name in axes:
+        if value.step and not value.before and value.name in axes:
             low, high = axes[value.name]
             if not low <= float(value.text) <= high:
                 why = f"{value.text} is not between {low:g} and {high:g} deg."
