@@ -114,9 +114,11 @@ class Step(Declared):
 
     Attributes:
         word: its name in a script; "" for a base class.
+        by_fingers: whether only an arm whose fingers move can do it.
     """
 
     word: ClassVar[str] = ""
+    by_fingers: ClassVar[bool] = False
 
     def __init_subclass__(cls, word: str = "", example: str | None = None, **options: Any) -> None:
         """Enter the class as the step ``word``, which is also its noun in messages."""

@@ -226,9 +226,17 @@ KNOWN_STEPS: dict[str, type[Declared]] = {**STEPS, **BLOCKS}
 """Class of everything that a list of steps may hold, by its name."""
 
 
-def examples() -> dict[str, str]:
-    """Return a valid example of each step that the page offers to insert, by the step's name."""
-    values = {name: step.example for name, step in KNOWN_STEPS.items() if step.example is not None}
+BY_FINGERS = tuple(name for name, step in STEPS.items() if step.by_fingers)
+"""Steps for which an arm needs fingers that move."""
+
+
+def examples(*, fingers: bool) -> dict[str, str]:
+    """Return a valid example of each step that the page offers to insert, by the step's name.
+
+    ``fingers``: whether the arm has fingers that move.
+    """
+    steps = {name: KNOWN_STEPS[name] for name in KNOWN_STEPS if fingers or name not in BY_FINGERS}
+    values = {name: step.example for name, step in steps.items() if step.example is not None}
     return {name: f"{name}: {value}".removesuffix(": ") for name, value in values.items()}
 
 

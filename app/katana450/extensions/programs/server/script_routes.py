@@ -59,7 +59,9 @@ class ScriptRoutes:
         arm = self._context.hub.arm
         model = None if arm is None else arm.robot.arm
         names = await asyncio.to_thread(self._scripts.offered, model)
-        return _json({"names": names, "saves": self._scripts.keeps, "steps": examples()})
+        fingers = arm is None or (model or arm.robot.joint_group).gripper.moves
+        steps = examples(fingers=fingers)
+        return _json({"names": names, "saves": self._scripts.keeps, "steps": steps})
 
     async def _schema(self, _request: Request) -> Response:
         """Return the JSON Schema of scripts, which holds nothing of this server."""

@@ -85,6 +85,7 @@ class Grasp(Step, word="grasp", example="cup"):
         height: above the underside of the object [m]; None for HEIGHT_FRACTIONS of its height.
     """
 
+    by_fingers = True
     short = "name"
 
     name: Object

@@ -56,6 +56,7 @@ class PlaceHeld(Step, word="place", example="{at: {x: 300, y: 60}}"):
         in_base: whether ``at`` is in the base frame instead of {S}.
     """
 
+    by_fingers = True
     noun = "`place`"
     needs = ("at", "on")
 
@@ -109,6 +110,7 @@ class PlaceHeld(Step, word="place", example="{at: {x: 300, y: 60}}"):
 class SetDown(Step, word="set_down", example=""):
     """Put the held object back to where it was grasped, and draw back."""
 
+    by_fingers = True
     noun = "`set_down`"
 
     def build(self, plan: PlanState) -> PlanState:
@@ -130,6 +132,7 @@ class Release(Step, word="release", example=""):
     The object stands on what is below it.
     """
 
+    by_fingers = True
     noun = "`release`"
 
     def build(self, plan: PlanState) -> PlanState:

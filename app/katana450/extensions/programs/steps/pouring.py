@@ -366,6 +366,7 @@ class Pour(Step, word="pour", example="basin"):
         shake: number of shakes after all is poured; None for SHAKES.
     """
 
+    by_fingers = True
     short = "into"
 
     into: ObjectName

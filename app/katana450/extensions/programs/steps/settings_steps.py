@@ -71,6 +71,7 @@ class Gripper(Step, word="gripper", example="open"):
         holding: name of the object that they must hold then; "" for any or none.
     """
 
+    by_fingers = True
     noun = "`gripper`"
     short = "to"
 
