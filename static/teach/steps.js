@@ -141,7 +141,7 @@ export class Steps {
     const examples = Object.entries(this.#sheet.scripts.examples).sort(([a], [b]) => COMMON.indexOf(b) - COMMON.indexOf(a));
     if (!on || this.#menu.childElementCount || !examples.length) return;
     const pose = button("present pose", async () => this.#insert(await this.#sheet.pose()), { title: "joints: the angles of the present goal" });
-    const others = examples.map(([word, step]) => button(word.replaceAll("_", " "), () => this.#insert(step), { title: step }));
+    const others = examples.map(([word, step]) => button(word.replaceAll("_", " "), () => this.#insert(step), { title: step, translate: "no" }));
     this.#menu.append(pose, ...others);
   }
 
