@@ -87,7 +87,10 @@ class Register(NamedTuple):
         return -(value & ((1 << self.sign_bit) - 1))
 
 
-MODEL, ID, BAUD = Register(3, 2), Register(5, 1), Register(6, 1)
+FIRMWARE, MODEL = Register(0, 2), Register(3, 2)
+"""Version of the firmware, with the major part in the low byte, and number of the model."""
+
+ID, BAUD = Register(5, 1), Register(6, 1)
 """Kept without power, like all up to the mode. A motor whose LOCK is 1 forgets what is written."""
 
 MIN_POSITION, MAX_POSITION = Register(9, 2, 15), Register(11, 2, 15)

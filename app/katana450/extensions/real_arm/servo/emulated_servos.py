@@ -32,10 +32,11 @@ FALL = 600.0
 
 VOLTS, CELSIUS = 7.4, 30.0
 
-MODEL_STS3215 = 777
+MODEL_STS3215, FIRMWARE_3_10 = 777, 0x0A03
 
+# Counted with the homing offsets below, which a calibration can change.
 RANGES = ((730, 3410), (900, 3180), (900, 3180), (960, 3140), (0, 4095), (2020, 3330))
-"""[ticks] Range of each motor."""
+"""[ticks] Mechanical range of each motor."""
 
 OFFSETS = (-37, 1200, 0, -2047, 15, 2047)
 """[ticks] Homing offset of each motor."""
@@ -59,7 +60,7 @@ class EmulatedServo:
     """One motor and what hangs on it.
 
     Attributes:
-        place, speed: where it is [ticks] and how fast [ticks/s].
+        place, speed: where it is [ticks], counted with its OFFSETS, and how fast [ticks/s].
         blocked, silent: whether something blocks it, and whether it does not answer.
         fault: errors that it reports.
         volts, celsius: its supply [V] and its temperature [degrees C].
@@ -72,9 +73,10 @@ class EmulatedServo:
         self.blocked = self.silent = False
         self.fault = MotorError(0)
         self.volts, self.celsius = VOLTS, CELSIUS
-        self._ends, self._sag = RANGES[number], SAG[number]
+        self._ends, self._sag, self._offset = RANGES[number], SAG[number], OFFSETS[number]
         self._memory = bytearray(128)
         for register, value in (
+            (reg.FIRMWARE, FIRMWARE_3_10),
             (reg.MODEL, MODEL_STS3215),
             (reg.ID, number + 1),
             (reg.MIN_POSITION, self._ends[0]),
@@ -102,13 +104,18 @@ class EmulatedServo:
         """Write ``data`` into the memory from ``address`` on."""
         self._memory[address : address + len(data)] = data[: max(len(self._memory) - address, 0)]
 
+    @property
+    def counted(self) -> float:
+        """Where it is [ticks], counted from its homing offset within one turn."""
+        return (self.place + self._offset - self[reg.HOMING_OFFSET]) % reg.TURN
+
     def step(self, dt: float) -> None:
         """Move for ``dt`` [s]."""
         lower, upper = self._ends
         weight = self._sag * math.cos((self.place - 0.5 * (lower + upper)) * math.tau / reg.TURN)
         holds = self[reg.TORQUE_ENABLE]
-        behind = min(max(self[reg.GOAL_POSITION], lower), upper) - self.place
-        behind = behind + weight if holds else 0.0
+        goal = min(max(self[reg.GOAL_POSITION], self[reg.MIN_POSITION]), self[reg.MAX_POSITION])
+        behind = goal - self.counted + weight if holds else 0.0
         force = self[reg.TORQUE_LIMIT] / 1000.0
         load = min(max(behind / STALL_ERROR, -force), force)
         wanted = GAIN * behind if holds else FALL * weight / max(SAG)
@@ -124,7 +131,7 @@ class EmulatedServo:
     def publish(self) -> None:
         """Write what was measured into the memory."""
         for register, value in (
-            (reg.PRESENT_POSITION, self.place),
+            (reg.PRESENT_POSITION, round(self.counted) % reg.TURN),
             (reg.PRESENT_SPEED, self.speed),
             (reg.PRESENT_LOAD, 1000.0 * self._load),
             (reg.PRESENT_VOLTAGE, 10.0 * self.volts),
