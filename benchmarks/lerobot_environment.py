@@ -1,7 +1,8 @@
-"""The environment in which LeRobot's own loader reads our datasets."""
+"""The environment in which LeRobot reads our datasets, and runs with our plug-ins."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import venv
@@ -14,7 +15,10 @@ CPU_SUFFIX = "+cpu"
 
 CPU_INDEX = "https://download.pytorch.org/whl/cpu"
 READY = ".ready"
-"""File in the environment that says that it is complete."""
+"""File in the environment that has the pins that are installed, once it is complete."""
+
+ROOT = Path(__file__).resolve().parents[1]
+PLUGINS = ("lerobot_robot_katana450", "lerobot_teleoperator_katana450")
 
 LINES_OF_REASON = 3
 
@@ -24,8 +28,8 @@ def prepare_lerobot(home: Path) -> Path | str:
 
     It is installed if it is missing, which takes 1.3 GB.
     """
-    python = home / "bin" / "python"
-    if (home / READY).is_file():
+    python, ready = home / "bin" / "python", home / READY
+    if ready.is_file() and ready.read_bytes() == PINS.read_bytes():
         return python
     venv.create(home, with_pip=True, clear=True)
     pins = [line for line in PINS.read_text(encoding="utf-8").split("\n") if "==" in line]
@@ -38,10 +42,12 @@ def prepare_lerobot(home: Path) -> Path | str:
         why = _failure([*install, *options, f"{torch}{CPU_SUFFIX}"])
         if not why:
             break
+    plugins = [word for name in PLUGINS for word in ("--editable", str(ROOT / "plugins" / name))]
     why = why or _failure([*install, *others])
+    why = why or _failure([*install, "--no-build-isolation", *plugins])
     if why:
         return why
-    (home / READY).touch()
+    ready.write_bytes(PINS.read_bytes())
     return python
 
 
@@ -60,5 +66,5 @@ def environment_of(sources: Path, home: Path) -> dict[str, str]:
         "HF_HUB_OFFLINE": "1",
         "HF_HOME": str(home / "cache"),
         "PATH": str(Path(sys.executable).parent),
-        "PYTHONPATH": str(sources),
+        "PYTHONPATH": os.pathsep.join(map(str, (sources, sources / "app"))),
     }

@@ -17,23 +17,17 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.lerobot_command import define_operators
+
 
 def loader() -> Any:
     """Return LeRobot's class of datasets."""
-    torch: Any = import_module("torch")
-    # torchvision for the processor only is not on PyPI. LeRobot's loader uses no operator of it,
-    # but torchvision refuses to be imported without this one.
-    library = torch.library.Library("torchvision", "DEF")
-    library.define("nms(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
-    KEPT.append(library)
+    define_operators()
     return import_module("lerobot.datasets.lerobot_dataset").LeRobotDataset
 
 
 NEAR = 3
 """Number of frames before and after."""
-
-KEPT: list[Any] = []
-"""Objects that must live as long as the process."""
 
 
 def compared(root: Path, expected: Path) -> dict[str, Any]:
