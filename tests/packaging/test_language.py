@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-CODE = ("app", "robot_description", "benchmarks", "examples", "tests")
+CODE = ("app", "robot_description", "benchmarks", "examples", "plugins", "tests")
 PROSE = ("docs", "examples")
 PAGE = (".js", ".html", ".css")
 

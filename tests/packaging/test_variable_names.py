@@ -37,7 +37,7 @@ AVOIDED = frozenset(
 """Names that say nothing about the quantity: `candidate`, `posture` or `match` says what it is."""
 
 ROOT = PACKAGE.parents[1]
-READ = ("app", "docs", "tests")
+READ = ("app", "docs", "plugins", "tests")
 
 EXCEPTED = (
     # Its keyword `at` is the word of scripts.
