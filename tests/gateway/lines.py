@@ -6,6 +6,7 @@ import json
 import re
 import socket
 import time
+from abc import abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -19,13 +20,13 @@ AT = re.compile(r"JSON lines on 127\.0\.0\.1:(\d+)")
 class JsonProgram:
     """A simple program that sends and receives JSON texts; subclasses have connection and clock."""
 
+    @abstractmethod
     def raw(self, data: bytes) -> None:
         """Send any text."""
-        raise NotImplementedError
 
+    @abstractmethod
     def hear(self) -> dict[str, Any]:
         """Return the next message."""
-        raise NotImplementedError
 
     def sleep(self, seconds: float) -> None:
         time.sleep(seconds)

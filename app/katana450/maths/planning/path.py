@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Any, Protocol
 
 import numpy as np
@@ -62,13 +63,13 @@ class CurvePath:
         joins: tuple[float, ...] = self.curve.joins
         return joins
 
+    @abstractmethod
     def joints(self, sigma: Jet) -> JointJets:
         """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def turned_off(self, sigma: FloatArray, q: FloatArray) -> FloatArray:
         """Return the angles (N,) [rad] between the tool at `q` (N, n) and at ``sigma`` (N,)."""
-        raise NotImplementedError
 
     @cached_property
     def start(self) -> FloatArray:

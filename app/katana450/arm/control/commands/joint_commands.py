@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -23,12 +24,12 @@ Axis = Annotated[int, Meta(ge=1, le=MAX_JOINTS)]
 class AxisCommand(Command, frozen=True):
     """Base of the commands that give single joints another target."""
 
+    @abstractmethod
     def targets(self, goal: FloatArray) -> FloatArray:
         """Return the joint targets (n,) [rad], given the present goal (n,) [rad] of the joints.
 
         Raises InputError for an unknown axis.
         """
-        raise NotImplementedError
 
 
 def with_axes(goal: FloatArray, values: tuple[tuple[int, float], ...]) -> FloatArray:

@@ -8,6 +8,7 @@ import signal
 import socket
 import threading
 import time
+from abc import abstractmethod
 from argparse import Namespace
 from collections.abc import Iterable
 from contextlib import suppress
@@ -77,9 +78,9 @@ class DeviceServer(Generic[ArmT]):
         self._now = time.monotonic()
         self._thread = threading.Thread(target=self.run, name="emulator", daemon=True)
 
+    @abstractmethod
     def _replies(self, data: bytes) -> Iterable[bytes]:
         """Return the replies to the requests that ``data`` completes."""
-        raise NotImplementedError
 
     def start(self) -> None:
         """Serve in a thread of its own."""
