@@ -29,6 +29,7 @@ from katana450.arm.control.lease import CommandChannel
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.assembly.page_routes import signed_in
 from katana450.assembly.web_server import WebServer
+from katana450.errors import KatanaError
 from katana450.extension import load, provided, results
 from katana450.server.api.fields import MAX_PRESS_LENGTH
 from katana450.server.service import status
@@ -44,7 +45,7 @@ from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
 from katana450.server.web.admission import Admission
-from katana450.server.web.bodies import refusal
+from katana450.server.web.bodies import refusal, status_of
 from katana450.server.web.channel import serve_page
 from katana450.settings import Settings
 
@@ -179,11 +180,12 @@ class Gateway:
 
 async def _refused(request: Request, error: Exception) -> Response:
     """Answer a request that is refused with an HTTP status."""
-    assert isinstance(error, HTTPException)
-    return refusal(request.url.path, error.detail, error.status_code, error.headers)
+    if isinstance(error, HTTPException):
+        return refusal(request.url.path, error.detail, error.status_code, error.headers)
+    return refusal(request.url.path, str(error), status_of(error))
 
 
-REFUSALS = {HTTPException: _refused}
+REFUSALS = dict.fromkeys((HTTPException, KatanaError), _refused)
 
 
 def control_routes(hub: Hub, budgets: Budgets, web: WebServer, proxy: Proxy) -> list[BaseRoute]:

@@ -191,10 +191,6 @@ class Uploads:
             except ChoiceError as error:
                 refused = answers.Refused(why=str(error), choices=list(error.choices))
                 return as_json(refused, NOT_UNDERSTOOD)
-            except InputError as error:
-                return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
-            except (LeaseError, CancelledError) as error:
-                return as_json(answers.Refused(why=str(error)), NOT_NOW)
 
     async def _in_thread(self, request: Request, read: Callable[[], T]) -> T:
         """Return the result of ``read``, run in a thread, or cancel it if the client leaves.

@@ -14,7 +14,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from katana450.arm.control.lease import CommandChannel
-from katana450.errors import ConfigurationError, InputError
+from katana450.errors import ConfigurationError
 from katana450.extensions.gallery.arms_command import listed_robots
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
 from katana450.extensions.robot_choice.robot_check import FIRST, OWN, first_robot
@@ -122,8 +122,6 @@ def routes(context: RouteContext) -> list[BaseRoute]:
         except ChoiceError as error:
             refused = answers.Refused(why=str(error), choices=list(error.choices))
             return as_json(refused, NOT_UNDERSTOOD)
-        except (InputError, ConfigurationError) as error:
-            return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
         answer = Kept(_uploaded(key, uploaded_robots()[key]))
         return Response(msgspec.json.encode(answer), media_type="application/json")
 

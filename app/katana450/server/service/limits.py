@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
+
+from katana450.errors import InputError
+
+T = TypeVar("T")
 
 
 class TokenBucket:
@@ -109,3 +115,32 @@ class ConnectionLimit:
             self._taken[identity] -= 1
             if not self._taken[identity]:
                 del self._taken[identity]
+
+
+class CrowdedError(InputError):
+    """Raised for work that is refused because too much of it waits."""
+
+
+class BoundedWork:
+    """Work in threads: some of it at the same time, while more waits, and the rest is refused."""
+
+    def __init__(self, at_once: int, maximum: int, refusal: str) -> None:
+        """Do ``at_once`` of at most ``maximum``. ``refusal``: what to say beyond it."""
+        self._working = asyncio.Semaphore(at_once)
+        self._maximum, self._refusal = maximum, refusal
+        self._count = 0
+
+    async def result(self, act: Callable[[], T]) -> T:
+        """Return the result of ``act``. Raises its errors, and CrowdedError."""
+        if self._count >= self._maximum:
+            raise CrowdedError(self._refusal)
+        # A thread that nobody waits for any more still counts until it ends.
+        return await asyncio.shield(self._done(act))
+
+    async def _done(self, act: Callable[[], T]) -> T:
+        self._count += 1
+        try:
+            async with self._working:
+                return await asyncio.to_thread(act)
+        finally:
+            self._count -= 1

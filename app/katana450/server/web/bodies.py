@@ -10,8 +10,10 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
+from katana450.errors import CancelledError, LeaseError
 from katana450.server.api import answers
 from katana450.server.api.fields import API
+from katana450.server.service.limits import CrowdedError
 
 NOT_NOW, TOO_SLOW, TOO_LONG, NOT_UNDERSTOOD, TOO_MANY = 409, 408, 413, 422, 429
 """HTTP status codes of refusals."""
@@ -52,6 +54,13 @@ def as_json(
     if isinstance(answer, answers.Refused):
         answer = answer.with_status(status)
     return Response(answers.encoded(answer), status, headers, media_type="application/json")
+
+
+def status_of(error: Exception) -> int:
+    """Return the HTTP status of a refusal by ``error``, a KatanaError."""
+    if isinstance(error, CrowdedError):
+        return TOO_MANY
+    return NOT_NOW if isinstance(error, LeaseError | CancelledError) else NOT_UNDERSTOOD
 
 
 def refusal(path: str, why: str, status: int, headers: Mapping[str, str] | None = None) -> Response:

@@ -25,8 +25,9 @@ from katana450.extensions.programs.script.script import examples, parse, script_
 from katana450.extensions.programs.script.script_files import Scripts
 from katana450.extensions.programs.script.teach import DIGITS, taught
 from katana450.server.api.fields import ROOT
+from katana450.server.service.limits import BoundedWork
 from katana450.server.service.participants import actor_of
-from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, body_of
+from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, body_of
 from katana450.server.web.http_api import RouteContext
 
 MAX_WAITING = 8
@@ -40,8 +41,7 @@ class ScriptRoutes:
         """Serve ``scripts`` to the clients of ``context``."""
         self._context = context
         self._scripts = scripts
-        self._reading = asyncio.Lock()
-        self._waiting = 0
+        self._work = BoundedWork(1, MAX_WAITING, "Too many scripts at once. Wait a moment.")
 
     def routes(self) -> list[BaseRoute]:
         """Return all routes."""
@@ -109,10 +109,7 @@ class ScriptRoutes:
         sender = self._context.identity(request)
 
         def save(text: str) -> Response:
-            try:
-                parse(text)
-            except InputError as error:
-                raise HTTPException(NOT_UNDERSTOOD, str(error)) from error
+            parse(text)
             try:
                 self._scripts.save(name, text)
             except InputError as error:
@@ -130,18 +127,11 @@ class ScriptRoutes:
         if not self._context.identity(request).role.may_drive:
             raise HTTPException(403, "You may watch, not drive.")
         data = await body_of(request, MAX_BYTES)
-        if self._waiting >= MAX_WAITING:
-            raise HTTPException(TOO_MANY, "Too many scripts at once. Wait a moment.")
         try:
             text = data.decode()
         except UnicodeDecodeError as error:
             raise HTTPException(NOT_UNDERSTOOD, "The script is not UTF-8 text.") from error
-        self._waiting += 1
-        try:
-            async with self._reading:
-                return await asyncio.to_thread(act, text)
-        finally:
-            self._waiting -= 1
+        return await self._work.result(lambda: act(text))
 
 
 def routes(context: RouteContext) -> list[BaseRoute]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 from dataclasses import replace
+from functools import partial
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -32,8 +33,9 @@ from katana450.server.api.episode_requests import (
 )
 from katana450.server.api.fields import ROOT
 from katana450.server.service.identity import PAGE
+from katana450.server.service.limits import BoundedWork, CrowdedError
 from katana450.server.service.participants import actor_of
-from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
+from katana450.server.web.bodies import NOT_NOW, as_json, body_of
 from katana450.server.web.http_api import RouteContext
 
 MAX_WAITING = 3
@@ -55,7 +57,8 @@ class EpisodeRoutes:
         self._context = context
         self._folder, self._link = folder, link
         self._read = EpisodeFolder(folder)
-        self._waiting = 0
+        crowded = "Too many requests at once. Wait a moment."
+        self._work = BoundedWork(MAX_WAITING, MAX_WAITING, crowded)
         self._listing = asyncio.Lock()
 
     def routes(self) -> list[BaseRoute]:
@@ -104,22 +107,17 @@ class EpisodeRoutes:
         if visitor is not None and PAGE.fullmatch(page):
             # The name that the person has chosen on the page.
             actor = replace(actor, person=self._context.hub.person_of(visitor, page))
-        try:
-            decoded = episode_request(body)
-        except InputError as error:
-            return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
-        if self._waiting >= MAX_WAITING:
-            raise HTTPException(TOO_MANY, "Too many requests at once. Wait a moment.")
-        self._waiting += 1
+        decoded = episode_request(body)
         # The first episode waits for the process that records.
         wait = READY_SECONDS if isinstance(decoded, StartEpisode) else 0.0
         try:
-            done = await asyncio.to_thread(self._link.ask, decoded, giver_of(actor), wait)
+            ask = partial(self._link.ask, decoded, giver_of(actor), wait)
+            done = await self._work.result(ask)
+        except CrowdedError:
+            raise
         except InputError as error:
             self._context.hub.recorder.refuse("episode", actor, error)
             return as_json(answers.Refused(why=str(error)), NOT_NOW)
-        finally:
-            self._waiting -= 1
         what = {"do": decoded.__struct_config__.tag, "number": done["number"]}
         self._context.hub.recorder.note("episode", actor, what)
         return JSONResponse(done)
