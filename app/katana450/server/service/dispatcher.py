@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Awaitable
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -69,19 +70,23 @@ class Dispatcher:
                 if wait is not None and participant.heartbeat.open >= MAX_OPEN:
                     raise InputError(f"At most {MAX_OPEN} requests can wait at once.")
                 answer = self._execute(participant, request)
-                answer = msgspec.structs.replace(answer, id=request.id)
         except KatanaError as error:
             give_back(self._hub, participant)
             if not question or isinstance(error, BusyError):
                 self._hub.recorder.refuse(request, participant.actor, error)
             raise
 
+        if not isinstance(answer, answers.Answer):
+            return PendingAnswer(self._hub, participant, answers.Done(id=request.id), wait, answer)
+        answer = msgspec.structs.replace(answer, id=request.id)
         if isinstance(answer, answers.Done) and (wait or (answer.ticket and not answer.outcome)):
             fingers = isinstance(request, requests.Gripper)
             return PendingAnswer(self._hub, participant, answer, wait, fingers=fingers)
         return answer
 
-    def _execute(self, participant: Participant, request: Request) -> answers.Answer:
+    def _execute(
+        self, participant: Participant, request: Request
+    ) -> answers.Answer | Awaitable[answers.Done]:
         hub = self._hub
         still = request.traits.free or request.traits.question
         limit = math.inf if still else hub.gate.sample_delay
@@ -101,7 +106,7 @@ class Dispatcher:
                 # The channel has set the rate of states.
                 return answers.Done()
         command = self._handled(participant, request) or self._command(request)
-        if isinstance(command, answers.Answer):
+        if isinstance(command, answers.Answer | Awaitable):
             return command
         if command is None:
             self._change_lease(participant, request)
@@ -116,7 +121,7 @@ class Dispatcher:
 
     def _handled(
         self, participant: Participant, request: Request
-    ) -> answers.Answer | cmd.Command | None:
+    ) -> answers.Answer | cmd.Command | Awaitable[answers.Done] | None:
         """Return what the handler of ``request`` does; None for a request of the core."""
         for handler in self._hub.handlers:
             if isinstance(request, handler.request_types):

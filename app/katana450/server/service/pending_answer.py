@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import replace
 
@@ -64,14 +64,17 @@ class PendingAnswer:
         participant: Participant,
         done: answers.Done,
         wait: float | None = None,
+        late: Awaitable[answers.Done] | None = None,
         *,
         fingers: bool = False,
     ) -> None:
         """Begin to wait for the parts that ``done`` lacks.
 
-        ``wait``: maximum duration of the motion [s]; None to answer with the outcome. ``fingers``:
-        whether the fingers move, and not the arm.
+        ``wait``: maximum duration of the motion [s]; None to answer with the outcome. ``late``: an
+        answer that takes long, in place of ``done``. ``fingers``: whether the fingers move, and not
+        the arm.
         """
+        self._late = late
         self._hub, self._participant, self.done, self._wait = hub, participant, done, wait
         self._motions, self._revocations = hub.gate.motions, hub.gate.revocations
         self._began, self._fingers = hub.clock(), fingers
@@ -104,6 +107,14 @@ class PendingAnswer:
 
     async def _concluded(self) -> answers.Answer:
         """Return the answer with the outcome of the command, as the arm's process reports it."""
+        if self._late is not None:
+            try:
+                self.done = msgspec.structs.replace(await self._late, id=self.done.id)
+            except KatanaError as error:
+                return answers.Refused(id=self.done.id, why=str(error))
+            # What came before the command is no end of its motion.
+            gate = self._hub.gate
+            self._motions, self._revocations = gate.motions, gate.revocations
         ticket = self.done.ticket
         if ticket is None or self.done.outcome is not None:
             return self.done

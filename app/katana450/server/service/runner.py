@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
 from typing import Any, ClassVar, NamedTuple
 
 from katana450.arm.control.commands import commands as cmd
@@ -23,11 +24,16 @@ class RequestHandler:
 
     request_types: ClassVar[tuple[type[Request], ...]] = ()
 
-    def handle(self, participant: Participant, request: Request) -> answers.Answer | cmd.Command:  # noqa: ARG002
+    def handle(
+        self,
+        participant: Participant,  # noqa: ARG002
+        request: Request,
+    ) -> answers.Answer | cmd.Command | Awaitable[answers.Done]:
         """Execute ``request``, one of ``request_types``, and return its answer.
 
         The dispatcher submits a returned command in the name of ``participant``, and answers with
-        its outcome. Raises LeaseError and InputError with the reason for a refusal.
+        its outcome. It awaits an answer that takes long, and raises the same errors: LeaseError and
+        InputError with the reason for a refusal.
         """
         kind = type(request).__name__
         raise AssertionError(f"{type(self).__name__} lists {kind} and does not execute it.")
