@@ -10,7 +10,8 @@ import math
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -313,61 +314,78 @@ def recorded_input(
         yield reader.checkpoint(message) if is_complete else reader.tick(message)
 
 
-def state_after(session: Session, tick_inputs: Sequence[State | TickInput | TickMessage]) -> State:
+def check_inside(file: RecordingFile, t: float) -> None:
+    """Raise InputError if ``file`` does not have the moment ``t`` [s] after its start."""
+    length = file.end - file.start
+    if not 0.0 <= t <= length:
+        raise InputError(f"{file.path} is {length:.2f} s long, so it has no moment {t:g} s.")
+
+
+def simulated_state(file: RecordingFile, session: Session, t: float) -> State:
+    """Return the state of ``file`` at ``t`` [s] after its start. Raises as ``state_after``.
+
+    Where this process rounds otherwise than the server did, setpoints may differ by SAME.
+    """
+    check_inside(file, t)
+    t, exact = file.start + t, not simulates_apart(file)
+    state = state_after(session, list(recorded_input(file, t, t)), exact=exact)
+    row = file.last_before(STATE, t)
+    recorded = state.setpoint if row is None else np.array(content_of(row, StateRow).setpoint)
+    if _apart(state.setpoint, recorded) > SAME:
+        raise InputError(INEXACT)
+    return state
+
+
+SAME = 1e-6
+"""[rad or m] Difference of a setpoint that the rounding of some simulated seconds can make."""
+
+INEXACT = (
+    "This moment cannot be simulated exactly: it was recorded by another version, or on a "
+    "processor that rounds otherwise. Choose the start of the recording."
+)
+
+
+def state_after(
+    session: Session, tick_inputs: Sequence[State | TickInput | TickMessage], *, exact: bool = True
+) -> State:
     """Return the state after the last tick of ``tick_inputs``, as in ``recorded_input``.
 
-    Raises InputError if it is not known, or is not the recorded one to the bit.
+    Raises InputError if it is not known, or is not the recorded one to the bit, unless that need
+    not be ``exact``.
     """
-    state: State | None = None
-    last: TickInput | None = None
-    for tick in tick_inputs:
-        if isinstance(tick, State):
-            state, last = tick, None
-        elif isinstance(tick, TickMessage):
-            state = last = None
-        elif state is not None:
-            state, last = after(session, state, tick), tick
+    state = next(iter(deque(simulated_states(session, tick_inputs), 1)), None)
     if state is None:
         raise InputError("This moment is not recorded completely. Choose a later one.")
-    if last is not None and Digester().digest(state) != last.digest:
-        raise InputError(
-            "This moment cannot be simulated exactly: it was recorded by another version, or on a "
-            "processor that rounds otherwise. Choose the start of the recording."
-        )
+    last = tick_inputs[-1]
+    if exact and isinstance(last, TickInput) and Digester().digest(state) != last.digest:
+        raise InputError(INEXACT)
     return state
 
 
 def simulated_states(
-    file: RecordingFile,
     session: Session,
-    start: float,
-    end: float,
+    tick_inputs: Iterable[State | TickInput | TickMessage],
     lost: Callable[[int], None] | None = None,
-) -> Iterator[State]:
-    """Yield the states from the last complete state before ``start`` to ``end`` [s].
+) -> Iterator[State | None]:
+    """Yield the state after each of ``tick_inputs``, as in ``recorded_input``; None if unknown.
 
-    After a gap it continues at the next complete state. Raises InputError for a damaged recording,
-    and for one of another robot.
+    After a gap it is known again at the next complete state. Raises InputError for a damaged
+    recording, and for one of another robot.
 
     Args:
-        file: the recording.
-        session: the rules of its robot.
-        start: first time of interest, on the clock of the recording [s].
-        end: last time [s].
-        lost: called with the number of ticks that cannot be simulated. Each complete state is taken
-            then, also after ticks that rules of another version refuse. None raises their errors.
+        session: the rules of the robot.
+        tick_inputs: the complete states and ticks.
+        lost: called with the number of ticks that cannot be simulated, also of those that rules of
+            another version refuse. None raises their errors.
     """
     state: State | None = None
     started = False
-    for tick in recorded_input(file, start, end):
+    for tick in tick_inputs:
+        missing = 0
         if isinstance(tick, State):
-            if state is not None and lost is None:
-                continue
+            check_fits(session, tick)
             state, started = tick, True
-            check_fits(session, state)
-            yield state
-            continue
-        if isinstance(tick, TickMessage):
+        elif isinstance(tick, TickMessage):
             missing, state = tick.ticks, None
         elif state is None:
             missing = int(started)
@@ -378,8 +396,6 @@ def simulated_states(
                 if lost is None:
                     raise
                 missing, state = 1, None
-            else:
-                yield state
-                continue
-        if lost is not None:
+        if missing and lost is not None:
             lost(missing)
+        yield state

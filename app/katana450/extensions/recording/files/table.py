@@ -22,7 +22,12 @@ from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.progress import report
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.simulation import MOMENT, content_of, simulated_states
+from katana450.extensions.recording.files.simulation import (
+    MOMENT,
+    content_of,
+    recorded_input,
+    simulated_states,
+)
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     STATE,
@@ -230,7 +235,8 @@ class RecordedStates:
         q = sampled(table["t"], table["q"], times)
         gripper = sampled(table["t"], table["gripper"], times)
         begin, end = float(times[0]), float(times[-1])
-        states = simulated_states(self._file, self._session, begin, end, self._lose)
+        tick_inputs = recorded_input(self._file, begin, end)
+        states = filter(None, simulated_states(self._session, tick_inputs, self._lose))
         known, following = None, next(states, None)
         for number, t in enumerate(times.tolist()):
             while following is not None and (known is None or following.t <= t + MOMENT):
