@@ -25,8 +25,5 @@ export const show = (query) => post(`${API}/show?${queryOf(query)}`);
 /** @param {string} page @returns {Promise<void>} */
 export const hide = (page) => post(`${API}/hide?page=${page}`);
 
-/** Let the arm continue from a moment. @param {Record<string, string | number>} query @returns {Promise<{ ticket: number }>} */
-export const restore = (query) => post(`${API}/restore?${queryOf(query)}`);
-
 /** Send a file and return {name, note} of its recording. @param {File} file @returns {Promise<{ name: string, note: string }>} */
 export const open = (file) => post(API, file);

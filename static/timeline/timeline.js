@@ -14,8 +14,9 @@ const [STEP, LONG_STEP] = [0.1, 1]; // s of the arrow keys, and with Shift
 const NEAR = 0.15; // s, within which a mark is at a moment
 // Nodes of the present that are hidden while the past is shown, beside the links that move.
 const PRESENT = /^\/(ghost|cup|basin|water|velocity|(target|handles|objects|path|branch)\/[^/]+)$/;
-// Requests that do not concern what is seen.
-const QUIET = /^(stop|rename|ask|withdraw|decline|give|acquire|take|release_lease|query|heartbeat|breakpoints|speed)$/;
+const CONTINUE = "continuation"; // id of the request
+// Requests that do not concern what is seen, or only once they are done.
+const QUIET = /^(stop|rename|continue_from|ask|withdraw|decline|give|acquire|take|release_lease|query|heartbeat|breakpoints|speed)$/;
 /** @type {Record<string, number>} */
 const ARROWS = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 };
 
@@ -36,6 +37,7 @@ export class Timeline {
   #playing = null; // time of the last frame [ms]
   /** @type {SecondRun | null} */
   #second = null; // second run, its start, and that of the first one
+  #from = 0; // the moment [s] from which the arm is to continue
   #busy = false; // whether a moment is requested
   #timer = 0;
   #failed = false; // whether the last look at the recording failed
@@ -127,11 +129,8 @@ export class Timeline {
 
   // Let the arm continue from the moment that is shown.
   #restore() {
-    const [t, { revocations = 0 }] = [this.#t ?? 0, this.#page.store.status ?? {}];
-    api.restore({ page: this.#page.name, of: this.#of, t, revocations }).then(() => {
-      this.live();
-      this.#page.toast(`The arm continues from ${timeInWords(t)}. Objects, speed and tool are as they were then.`);
-    }, (error) => this.#page.toast(messageOf(error)));
+    this.#from = this.#t ?? 0;
+    this.#page.say({ do: "continue_from", of: this.#of, t: this.#from, revocations: this.#page.store.status?.revocations, id: CONTINUE });
   }
 
   /** A request of this window, which moves what is seen. @param {Api.Act} request */
@@ -139,9 +138,12 @@ export class Timeline {
     if (!QUIET.test(request.do)) this.live();
   }
 
-  /** Take an answer; return whether it was for the motion that runs again. @param {Page.Answer} answer */
+  /** Take an answer; return whether it was for the timeline, and is no refusal that the page shows. @param {Page.Answer} answer */
   hear(answer) {
-    return this.#selection.run.hear(answer);
+    if (answer.id !== CONTINUE || answer.is === "refused") return this.#selection.run.hear(answer);
+    this.live();
+    this.#page.toast(`The arm continues from ${timeInWords(this.#from)}. Objects, speed and tool are as they were then.`);
+    return true;
   }
 
   #listen() {

@@ -28,7 +28,7 @@ def test_each_act_has_a_method_that_hides_none_of_the_clients() -> None:
             assert getattr(client, name) is getattr(Acts, name), "add the act to OWN"
     # Others are asked for or sent as objects, or by a method of another name.
     assert {kind.__name__ for kind in OWN if not hasattr(Client, kind.__name__.lower())} == {
-        *("ClearStop", "Heartbeat", "Hello", "Watch"),
+        *("ClearStop", "ContinueFrom", "Heartbeat", "Hello", "Watch"),
     }
 
 

@@ -126,7 +126,8 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Hello, requests.Heartbeat, requests.Query, requests.Get, requests.Watch,
         requests.Acquire, requests.Take, requests.Ask, requests.Withdraw, requests.ReleaseLease,
         requests.Give, requests.Decline, requests.Rename,
-        ChooseRobot,
+        # `test_continuation.py` has the second.
+        ChooseRobot, requests.ContinueFrom,
         # Refused at a simulated arm.
         requests.OperateArm,
     }  # fmt: skip

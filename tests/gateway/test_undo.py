@@ -7,7 +7,6 @@ import time
 import numpy as np
 import pytest
 
-from katana450.arm.control.commands.commands import RestoreState
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from tests.gateway.virtual import VirtualServer
@@ -68,19 +67,6 @@ def test_settings_are_undone(program: Client) -> None:
     after = state(program)
     assert (after.tool, after.speed) == (before.tool, before.speed)
     assert after.gripper_goal == pytest.approx(before.gripper_goal)
-
-
-def test_continuation_from_a_moment_is_undone(local: VirtualServer, program: Client) -> None:
-    program.go(requests.Home())
-    moment = local.hub.present().state
-    nudged = program.nudge(1, 0.2)
-    [driver] = local.hub.participants
-    local.hub.move(driver, RestoreState(moment))
-    local.sleep(0.1)
-    np.testing.assert_array_equal(state(program).q, moment.q)
-    program.ask(requests.Undo())
-    local.sleep(0.1)
-    np.testing.assert_array_equal(state(program).q, nudged.q)
 
 
 def test_removed_object_returns_and_new_one_goes(program: Client) -> None:

@@ -1,11 +1,11 @@
 // Written by `python -m docs.page_types` from the classes of the acts and answers.
 declare namespace Api {
   interface Acquire { do: "acquire"; id?: number | string | null; revocations?: number | null; made?: number | null; }
-  type Act = Acquire | Ask | Attach | Branch | Breakpoints | ChooseRobot | ClearStop | Decline | EndDrag | Fill | Get |
-    Give | GoToZero | Gripper | Heartbeat | Hello | Hold | Home | Jog | Joint | Joints | Load | Nudge | OperateArm |
-    Orient | Pause | Place | Pose | Position | Preview | Program | Query | Redo | ReleaseLease | Remove | Rename |
-    Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn | TurnElbow | Undo | Watch
-    | Withdraw;
+  type Act = Acquire | Ask | Attach | Branch | Breakpoints | ChooseRobot | ClearStop | ContinueFrom | Decline | EndDrag
+    | Fill | Get | Give | GoToZero | Gripper | Heartbeat | Hello | Hold | Home | Jog | Joint | Joints | Load | Nudge |
+    OperateArm | Orient | Pause | Place | Pose | Position | Preview | Program | Query | Redo | ReleaseLease | Remove |
+    Rename | Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn | TurnElbow |
+    Undo | Watch | Withdraw;
   type Answer = Arm | Branches | Done | Echo | Loop | Mesh | Objects | ProgramPlan | Refused | Scene | State | Values |
     Welcome | World;
   interface Arm { is: "arm"; id?: number | string | null; name: string; joints: string[]; lower: number[];
@@ -30,6 +30,8 @@ declare namespace Api {
     id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface ClearStop { do: "clear_stop"; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
+  interface ContinueFrom { do: "continue_from"; id?: number | string | null; revocations?: number | null;
+    made?: number | null; wait?: number | null; t: number; of?: string; }
   interface Decline { do: "decline"; id?: number | string | null; revocations?: number | null; made?: number | null;
     to: number; }
   interface Done { is: "done"; id?: number | string | null; ticket?: number | null; outcome?: string | null;

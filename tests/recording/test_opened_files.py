@@ -46,16 +46,16 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def context(urdf: Path | None = None) -> RouteContext:
+def context() -> RouteContext:
     who = Identity("session", "Ada", Role.OPERATOR)
     hub = SimpleNamespace(recorder=SimpleNamespace(note=lambda *_: None))
-    options = SimpleNamespace(urdf=urdf)
+    options = SimpleNamespace(urdf=None)
     return RouteContext(hub, None, lambda _: who, None, options)  # type: ignore[arg-type]
 
 
-def uploaded(store: RecordingStore, receive: Receive, urdf: Path | None = None) -> dict[str, Any]:
+def uploaded(store: RecordingStore, receive: Receive) -> dict[str, Any]:
     """Return the answer to a file whose parts ``receive`` returns."""
-    upload = PlaybackRoutes(context(urdf), store).routes()[0].endpoint  # type: ignore[attr-defined]
+    upload = PlaybackRoutes(context(), store).routes()[0].endpoint  # type: ignore[attr-defined]
     scope = {
         "type": "http", "method": "POST", "path": "/api/v1/playback", "query_string": b"",
         "headers": [], "server": ("127.0.0.1", 8080), "client": ("127.0.0.1", 5),
@@ -97,10 +97,10 @@ def test_file_of_another_robot_is_opened_with_a_note(
     temporary: Path, tmp_path: Path, content: bytes
 ) -> None:
     del temporary
-    store, other = RecordingStore(tmp_path), tmp_path / "other.urdf"
-    assert uploaded(store, parts(content))["note"] == ""
+    other = tmp_path / "other.urdf"
     other.write_bytes(URDF_PATH.read_bytes() + b"<!-- longer links -->")
-    assert uploaded(store, parts(content), other)["note"] == OTHER
+    for store, note in ((RecordingStore(tmp_path), ""), (RecordingStore(tmp_path, other), OTHER)):
+        assert uploaded(store, parts(content))["note"] == note
 
 
 def test_files_are_removed_with_their_store(temporary: Path, tmp_path: Path) -> None:

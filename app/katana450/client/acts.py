@@ -18,8 +18,8 @@ from katana450.server.api.episode_requests import AnyEpisodeRequest
 AtRest, Answered, Sent = TypeVar("AtRest"), TypeVar("Answered"), TypeVar("Sent")
 
 OWN = (
-    *(requests.Ask, requests.ClearStop, requests.Heartbeat, requests.Hello),
-    *(requests.Query, requests.Stop, requests.Watch),
+    *(requests.Ask, requests.ClearStop, requests.ContinueFrom, requests.Heartbeat),
+    *(requests.Hello, requests.Query, requests.Stop, requests.Watch),
 )
 """Acts for which the clients have methods of their own, or whose name such a method has."""
 

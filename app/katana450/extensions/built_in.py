@@ -89,6 +89,7 @@ EXTENSIONS = (
         ),
         serve_options=f"{HERE}.recording.serve_parts:add_serve_options",
         routes=f"{HERE}.recording.serve_parts:routes",
+        handler=f"{HERE}.recording.playback.continuation:Continuation",
         folder=f"{HERE}.recording.playback.drawing:PlaybackFolder",
         process=f"{HERE}.recording.serve_parts:process",
         tick_sender=f"{HERE}.recording.serve_parts:tick_sender",

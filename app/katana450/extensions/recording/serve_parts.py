@@ -78,16 +78,13 @@ def _episodes_folder(options: Namespace, port: int) -> Path:
 def routes(context: RouteContext) -> list[BaseRoute]:
     """Return the routes of recordings, play back and episodes."""
     from katana450.extensions.late_routes import LateRoutes
-    from katana450.extensions.recording.folders import default_folder
     from katana450.server.api.fields import ROOT
 
     options = context.options
-    port = context.hub.stop_path.main_port
-    folder: Path | None = None
     episodes: Path | None = None
     link: RecorderLink | None = None
     if options is not None and not options.no_record:
-        folder, episodes = options.record or default_folder(port), _episodes_folder(options, port)
+        episodes = _episodes_folder(options, context.hub.stop_path.main_port)
     address = getattr(options, "recorder", None)
     if address is not None:
         from katana450.extensions.programs.server.program_runner import ProgramRunner
@@ -101,9 +98,9 @@ def routes(context: RouteContext) -> list[BaseRoute]:
         from katana450.extensions.recording.episodes.routes import EpisodeRoutes
         from katana450.extensions.recording.live.jobs import RecordingRoutes
         from katana450.extensions.recording.playback.routes import PlaybackRoutes
-        from katana450.extensions.recording.playback.store import RecordingStore
+        from katana450.extensions.recording.playback.store import store_of
 
-        store = RecordingStore(folder)
+        store = store_of(context.hub, options)
         late_routes: list[BaseRoute] = [*RecordingRoutes(context, store).routes()]
         late_routes += PlaybackRoutes(context, store).routes()
         if episodes is not None and link is not None:

@@ -230,6 +230,24 @@ class Load(Request, frozen=True, kw_only=True):
     scene: Key
 
 
+class ContinueFrom(MotionRequest, frozen=True, kw_only=True):
+    """Let the simulated arm continue from a recorded moment.
+
+    Posture, speed, tool, objects and water are as they were then, and a motion that was under way
+    continues to its goal. The server first simulates the recording up to there. A stop or a change
+    of driver meanwhile voids the request. Refused are a real arm, and recordings of another robot.
+
+    Attributes:
+        t: The moment [s since the epoch].
+        of: Name of the recording: "ring" for the last minutes, or that of a file that was opened.
+    """
+
+    traits: ClassVar[Traits] = Traits(extension=True)
+
+    t: float
+    of: Annotated[str, Meta(max_length=40)] = "ring"
+
+
 class FieldName(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A field of a node of the VRML world.
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import math
-from collections.abc import Callable
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 from starlette.exceptions import HTTPException
@@ -16,11 +14,8 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from katana450.arm.control.commands.commands import RestoreState
 from katana450.arm.control.lease import CommandChannel
-from katana450.arm.control.state.state import State
-from katana450.errors import InputError, LeaseError
-from katana450.extensions.recording.files.simulation import state_after
+from katana450.errors import InputError
 from katana450.extensions.recording.playback.drawing import CONTEXTS, PlaybackWindows
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.store import (
@@ -30,18 +25,14 @@ from katana450.extensions.recording.playback.store import (
     RecordingStore,
     opened,
 )
-from katana450.resources import URDF_PATH
 from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import actor_of, key_of
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.web.admission import client_of
-from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_LONG, TOO_MANY, TOO_SLOW
+from katana450.server.web.bodies import NOT_NOW, TOO_LONG, TOO_MANY, TOO_SLOW
 from katana450.server.web.http_api import RouteContext
-
-AT_ONCE, WAITING = 2, 8
-"""Maximum number of requests that are worked on, and that wait, at the same time."""
 
 UPLOAD_TIMEOUT = 120.0
 """[s] Timeout of receiving a file."""
@@ -59,8 +50,6 @@ OTHER = (
 
 NO_SCENE = "The scene is not ready yet, or shows no robot. Wait a moment."
 
-T = TypeVar("T")
-
 
 class PlaybackRoutes:
     """The HTTP routes of play back."""
@@ -68,9 +57,7 @@ class PlaybackRoutes:
     def __init__(self, context: RouteContext, store: RecordingStore) -> None:
         """Serve the recordings of ``store``."""
         self._context, self._store = context, store
-        self._working = asyncio.Semaphore(AT_ONCE)
         self._receiving = asyncio.Lock()
-        self._waiting = 0
         self._windows: PlaybackWindows | None = None
 
     def routes(self) -> list[BaseRoute]:
@@ -80,7 +67,6 @@ class PlaybackRoutes:
             Route(path, self._open, methods=["POST"]),
             Route(f"{path}/show", self._show, methods=["POST"]),
             Route(f"{path}/hide", self._hide, methods=["POST"]),
-            Route(f"{path}/restore", self._restore, methods=["POST"]),
             Route(f"{path}/{{name}}", self._timeline),
         ]
 
@@ -92,7 +78,7 @@ class PlaybackRoutes:
             run.update()
             return _json({"spans": run.spans, "marks": run.marks()})
 
-        return await self._in_thread(read)
+        return await self._store.work.result(read)
 
     async def _show(self, request: Request) -> Response:
         """Show a moment of one recording, or of two, in the window that asks."""
@@ -114,7 +100,7 @@ class PlaybackRoutes:
             moments = [_moment_content(moment) for moment in shown]
             return _json({"moments": moments, "moving": windows.moving})
 
-        return await self._in_thread(show)
+        return await self._store.work.result(show)
 
     async def _hide(self, request: Request) -> Response:
         self._context.identity(request)
@@ -125,30 +111,6 @@ class PlaybackRoutes:
             return Response(status_code=HTTPStatus.NO_CONTENT)
 
         return await asyncio.to_thread(hide)
-
-    async def _restore(self, request: Request) -> Response:
-        """Let the arm of this server continue from a recorded moment, for the window that asks."""
-        query = request.query_params
-        self._context.driver(request, "set the arm back")
-        name = query.get("of", RING)
-        run, t = self._run(request, name), _number(query.get("t"))
-        _, key = self._window(request)
-        hub = self._context.hub
-        revocations = hub.gate.revocations
-
-        def simulate() -> State:
-            run.update()
-            if self._is_of_another_robot(run):
-                raise InputError("The recording is of another robot, whose states do not fit.")
-            return state_after(hub.present().session, run.input_until(t))
-
-        state = await self._in_thread(simulate)
-        try:
-            actor = hub.at_scene(key, int(query.get("revocations", revocations)))
-            ticket = hub.gate.submit(RestoreState(state, name), actor)
-        except (LeaseError, InputError) as error:
-            raise HTTPException(HTTPStatus.CONFLICT, str(error)) from error
-        return _json({"ticket": ticket})
 
     async def _open(self, request: Request) -> Response:
         """Receive a file, and return the name of its recording."""
@@ -162,7 +124,7 @@ class PlaybackRoutes:
             try:
                 async with asyncio.timeout(STALL_TIMEOUT) as timeout:
                     await _received(request, path, timeout)
-                run = await self._in_thread(lambda: opened(path))
+                run = await self._store.work.result(lambda: opened(path))
             except TimeoutError as error:
                 await asyncio.to_thread(path.unlink, missing_ok=True)
                 raise HTTPException(
@@ -177,14 +139,9 @@ class PlaybackRoutes:
             except BaseException:
                 path.unlink(missing_ok=True)
                 raise
-            other = await asyncio.to_thread(self._is_of_another_robot, run)
-            return _json({"name": self._store.add(path, run), "note": OTHER if other else ""})
-
-    def _is_of_another_robot(self, run: AnyRun) -> bool:
-        """Return whether ``run`` is that of another robot than the server's."""
-        urdf = getattr(self._context.options, "urdf", None) or URDF_PATH
-        digest = hashlib.sha256(Path(urdf).read_bytes()).hexdigest()
-        return run.metadata.get("urdf_sha256") != digest
+            other = await asyncio.to_thread(self._store.is_of_another_robot, run)
+            name, start = self._store.add(path, run), run.spans[0].start
+            return _json({"name": name, "start": start, "note": OTHER if other else ""})
 
     def _run(self, request: Request, name: str) -> AnyRun:
         """Return the recording ``name`` for the sender of ``request``. Raises HTTPException."""
@@ -211,19 +168,6 @@ class PlaybackRoutes:
         if self._windows is None:
             raise HTTPException(NOT_NOW, NO_SCENE)
         return self._windows
-
-    async def _in_thread(self, act: Callable[[], T]) -> T:
-        """Return the result of ``act``, run in a thread. Raises HTTPException for its errors."""
-        if self._waiting >= WAITING:
-            raise HTTPException(TOO_MANY, "Too many people play back at once. Wait a moment.")
-        self._waiting += 1
-        try:
-            async with self._working:
-                return await asyncio.to_thread(act)
-        except InputError as error:
-            raise HTTPException(NOT_UNDERSTOOD, str(error)) from error
-        finally:
-            self._waiting -= 1
 
 
 def windows_of(hub: Hub) -> PlaybackWindows | None:

@@ -9,6 +9,7 @@ was successful, and the result or the reason.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import pickle
 import secrets
@@ -19,23 +20,32 @@ import sys
 import threading
 import time
 import weakref
+from argparse import Namespace
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
+from weakref import WeakKeyDictionary
 
+from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
+from katana450.extensions.recording.files.simulation import state_after
 from katana450.extensions.recording.files.spans import Span
-from katana450.extensions.recording.folders import SUFFIX, recordings_in
+from katana450.extensions.recording.folders import SUFFIX, default_folder, recordings_in
 from katana450.extensions.recording.messages import TickMessage
 from katana450.extensions.recording.playback.marks import Mark
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.ticks import TickInput
 from katana450.platform_support import limit_resources, without_interrupts
+from katana450.resources import URDF_PATH
+from katana450.server.service.limits import BoundedWork
+
+if TYPE_CHECKING:
+    from katana450.server.service.hub import Hub
 
 TIMEOUT = 30.0
 """[s] Timeout of a request to the process."""
@@ -216,20 +226,45 @@ PREFIX = "katana450-opened-"
 AnyRun = PlaybackRun | OpenedRun
 """The last minutes, or an opened file."""
 
+AT_ONCE, WAITING = 2, 8
+"""Maximum number of requests that are worked on, and that wait, at the same time."""
+
+FULL = "Too many people play back at once. Wait a moment."
+
 MAX_FILES = 4
 """Number of opened files that are kept; the one that was opened first is closed."""
 
 
 class RecordingStore:
-    """Runs by their names. For use in one thread, except for the runs themselves."""
+    """Runs by their names, and the work on them. For one thread, except for the runs themselves."""
 
-    def __init__(self, ring: Path | None) -> None:
-        """Offer the ring in the folder ``ring``, if there is one."""
-        self.ring = ring
+    def __init__(self, ring: Path | None, urdf: Path | None = None) -> None:
+        """Offer the ring in the folder ``ring``, if there is one.
+
+        ``urdf``: the robot of the server; None for that of the app.
+        """
+        self.ring, self._urdf = ring, urdf or URDF_PATH
         self._temporary = Path(mkdtemp(prefix=PREFIX))
         weakref.finalize(self, shutil.rmtree, self._temporary, ignore_errors=True)
         self._ring = None if ring is None else PlaybackRun(lambda: recordings_in(ring))
         self._files: OrderedDict[str, tuple[Path, OpenedRun]] = OrderedDict()
+        self.work = BoundedWork(AT_ONCE, WAITING, FULL)
+        """The work on the runs, in threads."""
+
+    async def state_at(self, name: str, t: float, session: Session) -> State:
+        """Return the state of the run ``name`` at ``t`` [s since the epoch], by ``session``.
+
+        Raises InputError if it cannot be simulated exactly, as for another robot.
+        """
+        run = self.run(name)
+
+        def simulated() -> State:
+            run.update()
+            if self.is_of_another_robot(run):
+                raise InputError("The recording is of another robot, whose states do not fit.")
+            return state_after(session, run.input_until(t))
+
+        return await self.work.result(simulated)
 
     def run(self, name: str) -> AnyRun:
         """Return the run ``name``. Raises InputError if there is none."""
@@ -240,6 +275,11 @@ class RecordingStore:
         if name not in self._files:
             raise InputError("The server no longer has that recording. Open its file again.")
         return self._files[name][1]
+
+    def is_of_another_robot(self, run: AnyRun) -> bool:
+        """Return whether ``run`` is that of another robot than the server's."""
+        digest = hashlib.sha256(self._urdf.read_bytes()).hexdigest()
+        return run.metadata.get("urdf_sha256") != digest
 
     def file(self, name: str) -> Path:
         """Return the file of the opened recording ``name``. Raises InputError."""
@@ -262,6 +302,22 @@ class RecordingStore:
             run.close()
             old.unlink(missing_ok=True)
         return path.stem
+
+
+_stores: WeakKeyDictionary[Hub, RecordingStore] = WeakKeyDictionary()
+_making = threading.Lock()
+
+
+def store_of(hub: Hub, options: Namespace | None) -> RecordingStore:
+    """Return the recordings of the server of ``hub``, always the same. For any thread."""
+    with _making:
+        store = _stores.get(hub)
+        if store is None:
+            ring: Path | None = None
+            if options is not None and not options.no_record:
+                ring = options.record or default_folder(hub.stop_path.main_port)
+            store = _stores[hub] = RecordingStore(ring, getattr(options, "urdf", None))
+        return store
 
 
 def opened(path: Path) -> OpenedRun:
