@@ -71,6 +71,33 @@ def test_recorded_drag_runs_again(
     assert np.abs(katana450.open(recorded).setpoint[-1] - end).max() < 1e-6
 
 
+def test_arm_continues_from_a_moment_of_a_file_and_of_the_last_minutes(
+    shared_server: AppServer, recorded: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run, url = katana450.open(recorded), shared_server.url
+    # In the last motion.
+    t = float(run.t[-50] - run.start)
+    q, end = run.fork(t).state.q, run.setpoint[-1]
+    with katana450.connect(url, "Ada") as client:
+        state = client.fork(t, recorded)
+        assert np.abs(state.q - q).max() < 0.5 * np.abs(end - q).max()
+        assert np.abs(client.fork(run.start + run.utc_offset + t, wait=20.0).q - end).max() < 1e-6
+        with pytest.raises(RefusedError, match="no longer has that recording"):
+            client.ask(requests.ContinueFrom(t=t, of="0123"))
+        with pytest.raises(RefusedError, match="Nothing complete is recorded"):
+            client.fork(1.0)
+        with katana450.connect(url, "Bea") as other, pytest.raises(RefusedError, match="Ada"):
+            other.fork(t, recorded)
+        client.home()
+    command = ["record", "fork", str(recorded), "--url", url, "--at"]
+    assert main([*command, f"{t}"]) == 0
+    assert capsys.readouterr().out.endswith("The arm is at rest.\n")
+    with katana450.connect(url, "Ada") as client:
+        assert np.abs(client.query(answers.State).q - end).max() < 1e-6
+    assert main([*command, "999"]) == 1
+    assert "s long, so it has no moment 999 s" in capsys.readouterr().err
+
+
 def test_script_of_the_last_seconds_is_served(shared_server: AppServer, recorded: Path) -> None:
     address, cookie = f"{shared_server.url}/api/v1/recording/script", enter(shared_server.url)
     for query, status in (("?from=-1", 400), ("?to=x", 400), ("?from=9e9", 409), ("", 200)):

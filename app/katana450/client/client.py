@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import os
 import secrets
 import threading
 import time
@@ -297,6 +298,39 @@ class AsyncClient(
                     return state
         raise LostError("The server has closed the connection.")
 
+    async def fork(
+        self,
+        t: float,
+        recording: str | os.PathLike[str] | None = None,
+        wait: float | None = None,
+    ) -> answers.State:
+        """Let the simulated arm continue from a recorded moment; return its state.
+
+        Posture, speed, tool, objects and water are as they were then, and a motion that was under
+        way continues to its goal, unless another command follows.
+
+        Args:
+            t: the moment [s]: since the epoch, or with a ``recording`` after its start.
+            recording: file that the server opens; None for the last minutes of the server.
+            wait: maximum duration of the motion whose end is waited for [s]; None for none.
+
+        Raises:
+            RefusedError: the arm is real, stopped or driven by another client, the moment cannot be
+                simulated exactly, or the motion that is waited for ends early; with the reason.
+            OSError: the file cannot be read.
+        """
+        request = requests.ContinueFrom(t=t, wait=wait)
+        if recording is not None:
+            data = await asyncio.to_thread(Path(recording).read_bytes)
+            content = await asyncio.to_thread(self._site.fetched, f"{ROOT}/playback", data)
+            opened = msgspec.json.decode(content)
+            request = requests.ContinueFrom(t=opened["start"] + t, of=opened["name"], wait=wait)
+        done = await self.ask(request)
+        end = done.end if isinstance(done, answers.Done) else None
+        if end is not None and end.how not in ("reached", "limited"):
+            raise RefusedError(end.why)
+        return await self.query(answers.State)
+
     async def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
         """Upload the mesh in ``file``; scene objects refer to it by its key.
 
@@ -476,6 +510,7 @@ class Client(Acts[answers.State, answers.Answer, None]):
     stop = _blocking(AsyncClient.stop)
     clear_stop = _blocking(AsyncClient.clear_stop)
     go = _blocking(AsyncClient.go)
+    fork = _blocking(AsyncClient.fork)
     upload = _blocking(AsyncClient.upload)
     save_scene = _blocking(AsyncClient.save_scene)
     load_scene = _blocking(AsyncClient.load_scene)

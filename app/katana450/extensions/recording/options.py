@@ -47,7 +47,7 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     acts = parser.add_subparsers(
         dest="act",
         required=True,
-        metavar="keep | list | info | verify | again | trim | export",
+        metavar="keep | list | info | verify | again | fork | trim | export",
     )
     keep = acts.add_parser(
         "keep", help="keep what a server has just recorded, whether it still runs or not"
@@ -69,15 +69,12 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     listed = acts.add_parser("list", help="list the recordings and episodes in a folder")
     listed.add_argument("folder", type=Path, nargs="?", default=Path(), metavar="FOLDER")
     info = acts.add_parser("info", help="describe a recording")
-    info.add_argument("file", type=Path, metavar="FILE")
     verify = acts.add_parser(
         "verify", help="simulate the recorded commands again and compare every tick"
     )
-    verify.add_argument("file", type=Path, metavar="FILE")
     _add_urdf_option(verify)
     verify.add_argument("--json", action="store_true", help="print the result as JSON")
     again = acts.add_parser("again", help="drive an arm along a recorded motion")
-    again.add_argument("file", type=Path, metavar="FILE")
     again.add_argument(
         "--out", type=Path, metavar="FILE", help="write the script instead of running it"
     )
@@ -86,6 +83,17 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     )
     add_server_options(again)
     _add_urdf_option(again)
+    fork = acts.add_parser("fork", help="let a simulated arm continue from a recorded moment")
+    fork.add_argument(
+        "--at",
+        type=number(0.0, unit="s"),
+        required=True,
+        metavar="S",
+        help="the moment, in seconds after the start of the recording",
+    )
+    add_server_options(fork)
+    for command in (info, verify, again, fork):
+        command.add_argument("file", type=Path, metavar="FILE")
     trim = acts.add_parser("trim", help="write a part of a recording, or join several")
     trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
     export = acts.add_parser("export", help="write recordings for other programs")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import msgspec
 
+from katana450.arm.control.commands.act import MAX_WAIT
 from katana450.assembly.log_output import printable
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.progress import report
@@ -32,7 +33,7 @@ from katana450.extensions.recording.files.header import (
 )
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
-from katana450.extensions.recording.files.simulation import session_for, verified
+from katana450.extensions.recording.files.simulation import check_inside, session_for, verified
 from katana450.extensions.recording.files.table import write_csv
 from katana450.extensions.recording.files.trimming import keep, trim
 from katana450.extensions.recording.folders import recordings_in
@@ -77,6 +78,8 @@ def record(options: Namespace) -> int:
             return _info(options.file)
         case "verify":
             return _verify(options.file, options.urdf, as_json=options.json)
+        case "fork":
+            return _fork(options)
         case "trim":
             return _trim(options.files, options.out, options.start, options.end)
         case _:
@@ -196,6 +199,25 @@ def _trim(paths: list[Path], out: Path, start: float, end: float) -> int:
         with RecordingFile.open(path) as file:
             first = min(first, file.start)
     return _written(out, trim(paths, out, first + start, first + end))
+
+
+def _fork(options: Namespace) -> int:
+    """Let the arm of a server continue, and wait until it rests. Raises KatanaError."""
+    from katana450.client import connect
+
+    with RecordingFile.open(options.file) as file:
+        check_inside(file, options.at)
+    with connect(options.url, "Terminal", options.token) as arm:
+        about = f"Continuing {options.file} from {options.at:g} s. Ctrl-C holds the arm."
+        print(printable(about), flush=True)
+        try:
+            state = arm.fork(options.at, options.file, MAX_WAIT)
+        except KeyboardInterrupt:
+            arm.hold()
+            print("\nkatana450: the arm holds.", file=sys.stderr)
+            return 130
+    print(f"The arm is at rest. {state.why}".rstrip())
+    return 0
 
 
 def _written(out: Path, part: tuple[float, float]) -> int:
