@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import importlib
 import pkgutil
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 
 import katana450
 from katana450 import library
+from tests.recording.sessions import drag, record_session
 
 MODULES = [
     *(f"katana450.library.{module.name}" for module in pkgutil.iter_modules(library.__path__)),
@@ -22,7 +24,12 @@ METHODS = ("fk", "ik", "nearest", "jacobian", "plan", "line", "circle", "reachab
 
 MUST_HAVE = {f"katana450.library.arm.Arm.{name}" for name in METHODS} | {
     f"katana450.library.{name}"
-    for name in ("arm.load", "motion_plan.MotionPlan.sample", "motion_plan.MotionPlan.plot")
+    for name in (
+        "recording.Recording.fork",
+        "arm.load",
+        "motion_plan.MotionPlan.sample",
+        "motion_plan.MotionPlan.plot",
+    )
 }
 MUST_HAVE.add("katana450.maths.kinematics.pose.SE3")
 
@@ -36,12 +43,20 @@ EXAMPLES = [
 ]
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record_session(tmp_path_factory.mktemp("recorded") / "run.mcap", 150, drag(150))
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
 def test_examples_in_docstrings_run(
-    example: doctest.DocTest, shoulder_arm: katana450.Arm, capsys: pytest.CaptureFixture[str]
+    example: doctest.DocTest,
+    shoulder_arm: katana450.Arm,
+    recorded: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     mpl.use("Agg")
-    example.globs.update(katana450=katana450, np=np, arm=shoulder_arm)
+    example.globs.update(katana450=katana450, np=np, arm=shoulder_arm, path=recorded)
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
     result = doctest.DocTestRunner(optionflags=flags).run(example, out=print)
     assert result.attempted > 0

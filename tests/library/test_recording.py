@@ -10,8 +10,13 @@ import pytest
 import katana450
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.runtime.tick import TickRecord
+from katana450.extensions.recording.files import simulation
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import recorded_input
 from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.ticks import Digester, TickInput
 from tests.recording.recorded import record
+from tests.recording.sessions import drag, record_session
 
 TICKS = 110
 
@@ -58,6 +63,40 @@ def test_recording_verifies_itself(path: Path, records: list[TickRecord]) -> Non
     result = katana450.open(path).verify()
     assert result.identical
     assert result.ticks == len(records) - 1
+
+
+def test_forks_equal_the_recording_to_the_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, digester = record_session(tmp_path / "drag.mcap", 60, drag(50)), Digester()
+    recording = katana450.open(path)
+    with RecordingFile.open(path) as file:
+        first, *ticks = (
+            tick
+            for tick in recorded_input(file, file.start, file.end)
+            if isinstance(tick, TickInput)
+        )
+    fork = recording.fork(first.t - recording.start)
+    for tick in ticks:
+        commands = [submission.command for submission in tick.submissions]
+        fork = fork.step(*commands, seconds=tick.t - fork.state.t)
+        assert digester.digest(fork.state) == tick.digest
+        if tick in ticks[::15]:
+            jumped = recording.fork(tick.t - recording.start + 1e-6)
+            assert digester.digest(jumped.state) == tick.digest
+    other = fork.step(cmd.Home(), seconds=0.3)
+    assert other.state.moving
+    assert other.state.t == pytest.approx(fork.state.t + 0.3)
+    with pytest.raises(katana450.InputError, match="above 0"):
+        fork.step(seconds=0.0)
+    with pytest.raises(katana450.InputError, match="no moment"):
+        recording.fork(9.9)
+    # A process that rounds otherwise compares setpoints.
+    monkeypatch.setattr(simulation, "simulates_apart", lambda _: True)
+    assert digester.digest(recording.fork(0.3).state) != digester.digest(fork.state)
+    monkeypatch.setattr(simulation, "SAME", -1.0)
+    with pytest.raises(katana450.InputError, match="cannot be simulated exactly"):
+        recording.fork(0.3)
 
 
 def test_part_of_a_recording_begins_where_it_was_cut(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from katana450.arm.control.commands.commands import Command
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.recording.datasets.recorded_robot import orientations
@@ -20,9 +23,10 @@ from katana450.extensions.recording.files.simulation import (
     content_of,
     given_commands,
     session_for,
+    simulated_state,
     verified,
 )
-from katana450.extensions.recording.files.table import columns
+from katana450.extensions.recording.files.table import TICK, columns
 from katana450.extensions.recording.messages import EVENTS
 from katana450.extensions.recording.run_again import script_of_part
 from katana450.extensions.recording.ticks import Verification
@@ -59,6 +63,38 @@ class RecordedProgram:
     start: float
     end: float | None
     text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Fork:
+    """A simulation that continues from a moment of a recording; see ``Recording.fork``.
+
+    Attributes:
+        session: the rules of the recorded robot.
+        state: all that a run continues with: joints ``q``, time ``t``, ``objects`` and more.
+    """
+
+    session: Session
+    state: State
+
+    def step(self, *commands: Command, seconds: float = TICK) -> Fork:
+        """Return the simulation after ``seconds``, in ticks of 10 ms; this one stays as it is.
+
+        Args:
+            commands: commands of `katana450.sdk.commands`, which the first tick takes.
+            seconds: duration [s]; that of one tick without it.
+
+        Raises:
+            InputError: a command is invalid, or the duration is not above 0.
+        """
+        if not 0.0 < seconds < math.inf:
+            raise InputError(f"`seconds` must be above 0, not {seconds}.")
+        state, ticks = self.state, max(round(seconds / TICK), 1)
+        for number in range(ticks):
+            t = self.state.t + seconds * (number + 1) / ticks
+            state = self.session.step(state, () if number else commands, t)
+            state = Session.observe(state, state.setpoint, state.gripper_setpoint)
+        return Fork(self.session, state)
 
 
 class Recording:
@@ -180,6 +216,28 @@ class Recording:
             InputError: the file is damaged, or is of another robot.
         """
         return verified(self.path, None if urdf is None else Path(urdf))
+
+    def fork(self, t: float, *, urdf: str | os.PathLike[str] | None = None) -> Fork:
+        """Return a simulation that continues from a moment, to the bit as the arm did.
+
+        Args:
+            t: the moment [s] after the start of the recording.
+            urdf: file of the recorded robot, if it is not the Katana450 of this package.
+
+        Raises:
+            InputError: the moment is outside the recording, is not recorded completely or cannot
+                be simulated exactly; the file is damaged, or is of another robot.
+
+        Example:
+            >>> from katana450.sdk import commands
+            >>> fork = katana450.open(path).fork(1.0)
+            >>> other = fork.step(commands.Home(), seconds=0.5)
+            >>> round(other.state.t - fork.state.t, 3)
+            0.5
+        """
+        with RecordingFile.open(self.path) as file:
+            session = session_for(file, None if urdf is None else Path(urdf)).session
+            return Fork(session, simulated_state(file, session, t))
 
     def script(
         self,
