@@ -12,6 +12,7 @@ from robot_description.cad.build import CONDUITS, MESHES, Built, build, write_co
 from robot_description.cad.hulls import COLLISION, build_hulls, with_collisions
 from robot_description.cad.mass import write_inertials
 from robot_description.cad.props import PROPS, build_props
+from robot_description.cad.so101 import URDF, build_so101
 from robot_description.cad.stl import STL, build_stl
 
 
@@ -57,6 +58,7 @@ def main() -> None:
     urdf.write_text(with_collisions(URDF_PATH.read_text("utf-8"), folder / COLLISION.name), "utf-8")
     write_inertials(urdf)
     print(f"inertials and collision shapes in {urdf}")
+    _report("so101", build_so101(folder / URDF.stem))
 
 
 if __name__ == "__main__":

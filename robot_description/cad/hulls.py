@@ -8,7 +8,7 @@ frame.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from pathlib import Path
@@ -130,11 +130,16 @@ def build_hulls(folder: Path = COLLISION) -> Iterator[Built]:
         old.unlink()
     for make in PARTS:
         part = make()
-        for number, hull in enumerate(hulls_of(part)):
-            data = _stl_bytes(hull)
-            path = folder / f"{part.link}_{number}.stl"
-            path.write_bytes(data)
-            yield Built(path, 0, hull.num_tri(), len(data))
+        yield from write_hulls(part.link, hulls_of(part), folder)
+
+
+def write_hulls(link: str, hulls: Iterable[Manifold], folder: Path) -> Iterator[Built]:
+    """Write each of the ``hulls`` of ``link`` as binary STL in metres into ``folder``."""
+    for number, hull in enumerate(hulls):
+        data = _stl_bytes(hull)
+        path = folder / f"{link}_{number}.stl"
+        path.write_bytes(data)
+        yield Built(path, 0, hull.num_tri(), len(data))
 
 
 def with_collisions(urdf: str, folder: Path = COLLISION) -> str:

@@ -33,8 +33,10 @@ from robot_description.cad.material import (
     PAD,
     PANEL,
     PLASTIC,
+    PRINT,
     RIM,
     RUBBER,
+    SERVO,
     STEEL,
     Material,
 )
@@ -47,6 +49,7 @@ DENSITY: Mapping[Material, float] = {  # kg/m^3
     ALUMINIUM: 2700.0,
     GREY: 2700.0,
     BRIGHT: 2700.0,
+    SERVO: 1550.0,
     MELAMINE: 1500.0,
     RIM: 1500.0,
     LAMINATE: 1400.0,
@@ -57,6 +60,7 @@ DENSITY: Mapping[Material, float] = {  # kg/m^3
     LENS: 1300.0,
     RUBBER: 1200.0,
     PAD: 1200.0,
+    PRINT: 840.0,
     BIRCH: 680.0,
 }
 """Sorted by density, highest first: where two materials overlap, the first one counts."""

@@ -44,6 +44,10 @@ BRASS = Material("brass", _hex("b98f4a"), 0.45, 0.38)
 LENS = Material("sensor window", _hex("561a26"), 0.0, 0.30)
 PAD = Material("black pad", _hex("27272a"), 0.0, 0.60)
 
+# Those of the SO-101
+PRINT = Material("printed plastic", _hex("ecc94f"), 0.0, 0.60)
+SERVO = Material("servo plastic", _hex("232427"), 0.0, 0.50)
+
 # The props'
 MELAMINE = Material("white melamine", _hex("ece9e2"), 0.0, 0.38)
 RIM = Material("blue rim", _hex("2c4f86"), 0.0, 0.38)
@@ -54,6 +58,7 @@ MATERIALS: tuple[Material, ...] = (
     *(ALUMINIUM, GREY, BRIGHT, STEEL),
     *(RUBBER, PLASTIC, PANEL, GREEN, BLUE),
     *(BRASS, LENS, PAD),
+    *(PRINT, SERVO),
     *(MELAMINE, RIM, LAMINATE, BIRCH),
 )
 """All materials, in the order in which their primitives are written."""

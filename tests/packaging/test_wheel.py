@@ -30,7 +30,8 @@ def run(folder: Path, *command: str | Path, text: str = "") -> str:
 def test_wheel_holds_one_package_with_its_data(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"katana450"}
-    for wanted in ("py.typed", "static/page.js", "robot_description/katana450.urdf"):
+    robots = ("katana450.urdf", "so101/so101.urdf", "so101/meshes/base_link.glb")
+    for wanted in ("py.typed", "static/page.js", *(f"robot_description/{name}" for name in robots)):
         assert f"katana450/{wanted}" in names
     for unwanted in ("/cad/", "__pycache__"):
         assert not [name for name in names if unwanted in name]

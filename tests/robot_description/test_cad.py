@@ -15,6 +15,7 @@ from robot_description.cad.hulls import COLLISION, build_hulls
 from robot_description.cad.outline import circle, inset, rounded
 from robot_description.cad.part import Part
 from robot_description.cad.props import build_props
+from robot_description.cad.so101 import URDF, build_so101
 from robot_description.cad.solid import lathe
 from robot_description.cad.stl import build_stl
 from tests.robot_description.solids import solid
@@ -27,8 +28,9 @@ from tests.robot_description.solids import solid
         (build_hulls, COLLISION),
         (build_stl, URDF_PATH.parent / "stl"),
         (build_props, PROPS_PATH.parent),
+        (build_so101, URDF.parent),
     ],
-    ids=["meshes", "hulls", "stl", "props"],
+    ids=["meshes", "hulls", "stl", "props", "so101"],
 )
 def test_rebuild_gives_the_committed_bytes(
     tmp_path: Path, make: Callable[[Path], Iterable[object]], folder: Path
@@ -36,8 +38,8 @@ def test_rebuild_gives_the_committed_bytes(
     if sys.platform != "linux" or platform.machine() != "x86_64":
         pytest.skip("the committed bytes are those of Linux on x86-64")
     list(make(tmp_path))
-    names = {path.name for path in tmp_path.iterdir()}
-    assert names == {path.name for path in folder.iterdir()}
+    names = {path.relative_to(tmp_path) for path in tmp_path.rglob("*.*")}
+    assert names == {path.relative_to(folder) for path in folder.rglob("*.*")}
     for name in names:
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes(), (
             f"{folder / name} is not what the code makes: run python -m robot_description.cad"
