@@ -16,7 +16,7 @@ from katana450.cli.main import main
 from katana450.errors import ConfigurationError
 from katana450.extensions.gallery.arms_command import file_of, listed_robots, robot_named
 from katana450.extensions.robot_choice.robot_routes import choices
-from katana450.resources import URDF_PATH
+from katana450.resources import INCLUDED, URDF_PATH
 from tests.browser.server import APP, AppServer
 from tests.gallery.stand_in import write_package
 
@@ -53,7 +53,8 @@ def why(name: str) -> str:
     [
         ("ur5e", "ur5e"),
         ("ur5e_description", "ur5e"),
-        ("SO-101", "so_arm101"),
+        ("SO-101", "so101"),
+        ("SO-ARM101", "so_arm101"),
         ("OpenManipulator-X", "open_manipulator_x"),
         ("iiwa 14", "iiwa14"),
     ],
@@ -65,7 +66,9 @@ def test_a_robot_is_found_by_any_common_form_of_its_name(typed: str, name: str) 
 @pytest.mark.usefixtures("arms")
 def test_arms_are_listed_with_common_names_and_apart_from_other_robots() -> None:
     listed = {choice.name: (choice.kind, choice.title) for choice in choices(URDF_PATH)}
-    assert listed["so_arm101"] == ("gallery", "SO-ARM101 (so101)")
+    assert [*listed][:2] == ["katana450", "so101"]
+    assert listed["so101"] == ("included", "SO-101")
+    assert listed["so_arm101"] == ("gallery", "SO-ARM101")
     assert listed["allegro_hand"] == ("other", "Allegro Hand (allegro)")
 
 
@@ -83,11 +86,26 @@ def test_the_list_states_maker_and_licence(capsys: pytest.CaptureFixture[str]) -
     assert main(["arms"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["NAME", "ROBOT", "MAKER", "LICENCE"]
-    rows = {line.split()[0]: line for line in lines[1:10]}
-    assert set(rows) == {robot.name for robot in listed_robots().values() if robot.urdf}
+    rows = {line.split()[0]: line for line in lines[1:12]}
+    assert set(rows) == {*INCLUDED} | {
+        robot.name for robot in listed_robots().values() if robot.urdf
+    }
     assert rows["so_arm101"].endswith("Apache-2.0")
     assert "Universal Robots" in rows["ur5e"]
-    assert "9 robots" in lines[-1]
+    assert "11 robots" in lines[-1]
+
+
+def test_included_robots_need_no_package(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "robot_descriptions", None)
+    assert main(["arms"]) == 0
+    assert "\nso101      SO-101 " in (listed := capsys.readouterr().out)
+    assert "2 robots. Robots of the gallery need the extra" in listed
+    assert main(["arms", "SO-101"]) == 0
+    assert capsys.readouterr().out == f"{INCLUDED['so101']}\n"
+    monkeypatch.setattr(sys, "stdin", io.StringIO('{"q": [0, 0, 0, 0, 0]}\n'))
+    assert main(["fk", "--arm", "so101"]) == 0
 
 
 def test_one_robot_prints_its_file_and_its_licence(

@@ -56,7 +56,6 @@ def test_each_missing_extra_is_named_with_its_command(
     picture = str(tmp_path / "a.png")
     uses: list[tuple[str, str, Callable[[], str]]] = [
         ("embreex", "pictures", lambda: answered("render", "--out", picture)),
-        ("robot_descriptions", "gallery", lambda: answered("arms")),
         ("robot_descriptions", "gallery", lambda: answered("serve", "--arm", "ur5e")),
         ("gymnasium", "learn", lambda: refused(run_path, str(LEARN))),
         ("serial", "serial", lambda: refused(open_arm, DeviceAddress("/dev/ttyUSB0", None))),

@@ -45,7 +45,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space
 from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.pose import check_radians, pose_matrix
-from katana450.resources import URDF_PATH
+from katana450.resources import robot_file
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
@@ -534,7 +534,7 @@ def load(
     ``method`` of the arm says which.
 
     Args:
-        urdf: the file; None for the Katana450.
+        urdf: the file, or "so101"; None for the Katana450.
         tool: link to which poses refer; None for the default (``tcp`` for the Katana450).
         frame: coordinates of all poses and points: "shoulder", the paper's frame {S} where axes 1
             and 2 cross, parallel to the base; or "base", the root link of the URDF.
@@ -553,7 +553,7 @@ def load(
         ...
     katana450.errors.RobotDescriptionError: ...
     """
-    path = URDF_PATH if urdf is None else Path(urdf)
+    path = robot_file(urdf)
     scene_path = None if scene is None else Path(scene)
     robot, session, notes = find_robot(Settings(), path, tool)
     if robot.arm is None:

@@ -23,7 +23,7 @@ from katana450.extensions.derived_urdf import derived_urdf
 from katana450.extensions.xacro.xacro_file import expanded
 from katana450.extensions.xacro.xacro_process import package_folder
 from katana450.extras import library
-from katana450.resources import URDF_PATH
+from katana450.resources import INCLUDED, URDF_PATH
 
 PACKAGE = "robot_descriptions"
 
@@ -34,14 +34,13 @@ ALIASES: Mapping[str, str] = {
     "allegro": "allegro_hand",
     "koch": "koch_arm",
     "so100": "so_arm100",
-    "so101": "so_arm101",
 }
 """Common names, in the form of ``_plain``, and those of the package."""
 
 
 @dataclass(frozen=True)
 class ListedRobot:
-    """One description of the package.
+    """One description of the package, or of this distribution.
 
     Attributes:
         name: without the ending.
@@ -51,6 +50,7 @@ class ListedRobot:
         source: address of the repository; empty if the package does not give it.
         urdf: whether it is a URDF or xacro file.
         is_arm: whether it is an arm, and not another kind of robot or a hand.
+        file: that of a robot of this distribution; None for one of the package.
     """
 
     name: str
@@ -61,6 +61,7 @@ class ListedRobot:
     source: str
     urdf: bool
     is_arm: bool
+    file: Path | None = None
 
     @property
     def alias(self) -> str:
@@ -73,8 +74,18 @@ class ListedRobot:
         return f"{PACKAGE}.{self.name}{ENDING}"
 
 
+INCLUDED_ROBOTS: Mapping[str, ListedRobot] = {
+    name: ListedRobot(name, robot, maker, "MIT", "", "", True, True, INCLUDED[name])
+    for name, robot, maker in (
+        ("katana450", "Katana450", "Neuronics"),
+        ("so101", "SO-101", "The Robot Studio"),
+    )
+}
+"""The robots of this distribution by name: their descriptions are its own."""
+
+
 def listed_robots() -> dict[str, ListedRobot]:
-    """Return all descriptions by name. Raises ConfigurationError without the package."""
+    """Return the package's descriptions by name. Raises ConfigurationError without the package."""
     descriptions = library(PACKAGE, "gallery", "Robots of the gallery").DESCRIPTIONS
     repositories = import_module(f"{PACKAGE}._repositories").REPOSITORIES
     robots = [
@@ -88,6 +99,8 @@ def robot_named(name: str) -> ListedRobot:
 
     Raises ConfigurationError with the nearest names if there is none, or if it has no URDF.
     """
+    if _plain(name) in INCLUDED_ROBOTS:
+        return INCLUDED_ROBOTS[_plain(name)]
     robots = {robot.name: robot for robot in listed_robots().values() if robot.urdf}
     others = {robot.name for robot in listed_robots().values()} - set(robots)
     wanted = _plain(name)
@@ -134,6 +147,8 @@ def file_of(robot: ListedRobot) -> Path:
 
     Raises ConfigurationError that says what to do: no git, no network, or a file that is missing.
     """
+    if robot.file is not None:
+        return robot.file
     module = _downloaded(robot)
     urdf = getattr(module, "URDF_PATH", None)
     if urdf is not None:
@@ -246,8 +261,8 @@ def _expanded_file(xacro: Path, arguments: Mapping[str, str], packages: Mapping[
 
 
 NOTE = (
-    "Each description has the licence that its repository states. It covers the meshes too, "
-    "unless the text says otherwise. Nothing of them is part of this program."
+    "katana450 and so101 are included. Each other description has the licence that its repository "
+    "states. It covers the meshes too, unless the text says otherwise."
 )
 
 
@@ -258,13 +273,17 @@ def arms(options: Namespace) -> int:
         print(file_of(robot))
         print(f"katana450: {credit(robot)}", file=sys.stderr)
         return 0
-    robots = [listed for listed in listed_robots().values() if listed.urdf]
+    robots, note = [*INCLUDED_ROBOTS.values()], NOTE
+    try:
+        robots += [listed for listed in listed_robots().values() if listed.urdf]
+    except ConfigurationError as error:
+        note = str(error)
     rows = [(listed.name, listed.robot, listed.maker, listed.licence) for listed in robots]
     rows.insert(0, ("NAME", "ROBOT", "MAKER", "LICENCE"))
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
     for row in rows:
         print("  ".join((*(text.ljust(n) for text, n in zip(row, widths, strict=False)), row[3])))
-    print(f"\n{len(robots)} robots. {NOTE}")
+    print(f"\n{len(robots)} robots. {note}")
     return 0
 
 
@@ -272,13 +291,11 @@ def choose(options: Namespace, name: str) -> None:
     """Let ``options`` name the file of the robot ``name`` of the gallery. Raises KatanaError."""
     if options.urdf != URDF_PATH:
         raise ConfigurationError("--arm NAME and --urdf name two robots. Leave one of them out.")
-    if _plain(name) == "katana450":
-        options.arm = None
-        return
     robot = robot_named(name)
     options.urdf, options.arm = file_of(robot), None
-    # Standard output is for the answers of the command.
-    print(f"katana450: {credit(robot)}", file=sys.stderr, flush=True)
+    if robot.file is None:
+        # Standard output is for the answers of the command.
+        print(f"katana450: {credit(robot)}", file=sys.stderr, flush=True)
 
 
 def credit(robot: ListedRobot) -> str:

@@ -27,7 +27,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.physics.joint import BodyJoint
 from katana450.maths.water.units import MILLILITRE, ML
-from katana450.resources import URDF_PATH
+from katana450.resources import robot_file
 from katana450.settings import Settings
 
 Numbers = npt.NDArray[np.float32]
@@ -166,7 +166,7 @@ class TaskEnvironment(gymnasium.Env[Numbers, Numbers]):
 
         Args:
             task: a key of ``TASKS``.
-            urdf: description of the arm; None for the Katana450.
+            urdf: description of the arm, or "so101"; None for the Katana450.
 
         Raises InputError for an unknown task or one of another arm, and RobotDescriptionError for
         a file without an arm whose hand can hold objects.
@@ -175,7 +175,7 @@ class TaskEnvironment(gymnasium.Env[Numbers, Numbers]):
             raise InputError(f"There is no task {task!r}. Choose from {', '.join(TASKS)}.")
         if urdf is not None and task == "Pour":
             raise InputError("Pour is for the Katana450 alone. Leave `urdf` out.")
-        path = URDF_PATH if urdf is None else Path(urdf)
+        path = robot_file(urdf)
         robot, self._session, _ = describe_robot(Settings(), path, None)
         self._arm, self._task, self._names = robot.require_arm(), task, TASKS[task]
         hand = self._session.environment.hand
