@@ -3,12 +3,12 @@ import { element, onChoice, styled } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { messageOf, request } from "../server.js";
 
-/** @typedef {{ name: string, title: string, kind: "own" | "first" | "uploaded" | "gallery" | "other", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
+/** @typedef {{ name: string, title: string, kind: "included" | "first" | "uploaded" | "gallery" | "other", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
 
 const box = element("robots", HTMLDialogElement);
 styled("robots.css", import.meta.url);
 
-const KINDS = { own: "Of this app", first: "With which the server began", uploaded: "Opened here", gallery: "Arms of the gallery, downloaded when first chosen", other: "Other robots of the gallery" };
+const KINDS = { included: "Included", first: "With which the server began", uploaded: "Opened here", gallery: "Arms of the gallery, downloaded when first chosen", other: "Other robots of the gallery" };
 const PATH = "api/v1/robots";
 
 const search = html("input", { type: "search", placeholder: "Name or maker", "aria-label": "Search a robot" });
@@ -69,7 +69,7 @@ function draw() {
   const words = search.value.split(/\s+/).map(plain);
   const matches = robots.filter((robot) => words.every((word) => plain(`${robot.name} ${robot.title} ${robot.maker ?? ""}`).includes(word)));
   list.replaceChildren();
-  for (const kind of /** @type {const} */ (["own", "first", "uploaded", "gallery", "other"])) {
+  for (const kind of /** @type {const} */ (["included", "first", "uploaded", "gallery", "other"])) {
     const group = matches.filter((robot) => robot.kind === kind);
     if (group.length) list.append(html("h2", {}, KINDS[kind]));
     for (const robot of group) {

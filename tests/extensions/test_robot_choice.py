@@ -133,13 +133,14 @@ def test_robot_that_was_not_used_for_longest_makes_room() -> None:
 
 def test_robot_with_which_the_server_began_is_listed_beside_ours() -> None:
     key = keep_robot(urdf(), "arm.urdf")
-    listed = choices(Path("/robots/mine.urdf"))[:3]
+    listed = choices(Path("/robots/mine.urdf"))[:4]
     assert [(robot.name, robot.title) for robot in listed] == [
         ("katana450", "Katana450"),
+        ("so101", "SO-101"),
         ("first", "mine.urdf"),
         (key, "arm.urdf"),
     ]
-    assert [robot.name for robot in choices(URDF_PATH)[:2]] == ["katana450", key]
+    assert [robot.name for robot in choices(URDF_PATH)[:3]] == ["katana450", "so101", key]
 
 
 @pytest.fixture
@@ -180,7 +181,7 @@ def test_server_drives_an_uploaded_robot_and_then_its_own_again(server: AppServe
     assert status == 200, answer
     name = answer["robot"]["name"]
     listed = json.loads(ask(f"{server.url}/api/v1/robots", Cookie=enter(server.url))[2])["robots"]
-    assert [robot["name"] for robot in listed[:2]] == ["katana450", name]
+    assert [robot["name"] for robot in listed[:3]] == ["katana450", "so101", name]
     with connect(server.url, "Ada") as ada, connect(server.url, "Bob") as bob:
         ada.ask(requests.Acquire())
         assert "Ada" in refusal(bob, ChooseRobot(robot=name))

@@ -15,8 +15,7 @@ from starlette.routing import BaseRoute
 from katana450.arm.control.commands.act import Request, Traits
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.extensions.late_routes import LateRoutes
-from katana450.extensions.robot_choice.robot_check import FIRST, OWN, checked_robot, first_robot
-from katana450.resources import URDF_PATH
+from katana450.extensions.robot_choice.robot_check import FIRST, checked_robot, first_robot
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
@@ -71,7 +70,7 @@ class RobotChoice(RequestHandler):
         self._problem: str = getattr(options, "robot_problem", None) or ""
         urdf = Path(options.urdf)
         self._robot = {
-            "name": OWN if urdf == URDF_PATH else urdf.stem,
+            "name": urdf.stem,
             "key": hashlib.sha256(str(urdf).encode()).hexdigest()[:12],
         }
 
@@ -121,8 +120,8 @@ class RobotChoice(RequestHandler):
 
     def _file(self, name: str) -> Path:
         """Return the description of the robot ``name``. Raises KatanaError."""
-        if name in (OWN, FIRST):
-            return URDF_PATH if name == OWN else first_robot(self._options)
+        if name == FIRST:
+            return first_robot(self._options)
         from katana450.extensions.robot_choice.uploaded_robots import used_robot
 
         path = used_robot(name)

@@ -19,8 +19,8 @@ from katana450.arm.robot.visual import mesh_file
 from katana450.errors import InputError, KatanaError
 from katana450.platform_support import hanging_time, limit_resources
 
-OWN, FIRST = "katana450", "first"
-"""Names of the robot of this distribution, and of that with which the server began."""
+FIRST = "first"
+"""Name of the robot with which the server began."""
 
 SECONDS = 30.0
 """[s] Maximum processor time of reading a robot."""

@@ -15,11 +15,11 @@ from starlette.routing import BaseRoute, Route
 
 from katana450.arm.control.lease import CommandChannel
 from katana450.errors import ConfigurationError
-from katana450.extensions.gallery.arms_command import listed_robots
+from katana450.extensions.gallery.arms_command import INCLUDED_ROBOTS, ListedRobot, listed_robots
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
-from katana450.extensions.robot_choice.robot_check import FIRST, OWN, first_robot
+from katana450.extensions.robot_choice.robot_check import FIRST, first_robot
 from katana450.extensions.robot_choice.uploaded_robots import keep_robot, uploaded_robots
-from katana450.resources import URDF_PATH
+from katana450.resources import INCLUDED, URDF_PATH
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.limits import TokenBucket
@@ -47,7 +47,7 @@ class Choice(msgspec.Struct, frozen=True, omit_defaults=True):
         title: Its name for people.
         maker: Its maker; empty if unknown.
         licence: Licence of the description; empty if unknown.
-        kind: "own", "first" for the one with which the server began, "uploaded", or "gallery" for
+        kind: "included", "first" for that with which the server began, "uploaded", or "gallery" for
             an arm and "other" for another robot of the gallery, which may have to be downloaded.
         arguments: Arguments of a xacro file and their defaults.
     """
@@ -74,8 +74,8 @@ class Kept(msgspec.Struct, frozen=True):
 
 def choices(first: Path) -> list[Choice]:
     """Return the robots that can be chosen; ``first``: file of that with which the server began."""
-    robots = [Choice(OWN, "Katana450", "own", "Neuronics", "MIT")]
-    if first != URDF_PATH:
+    robots = [_listed(robot, "included") for robot in INCLUDED_ROBOTS.values()]
+    if first not in INCLUDED.values():
         robots.append(Choice(FIRST, first.name, "first"))
     robots += (_uploaded(name, path) for name, path in uploaded_robots().items())
     # Without the extra there is no gallery.
@@ -84,10 +84,13 @@ def choices(first: Path) -> list[Choice]:
         titles = Counter(robot.robot for robot in listed)
         for robot in listed:
             alias = robot.alias or (robot.name if titles[robot.robot] > 1 else "")
-            title = f"{robot.robot} ({alias})" if alias else robot.robot
-            kind = "gallery" if robot.is_arm else "other"
-            robots.append(Choice(robot.name, title, kind, robot.maker, robot.licence))
+            robots.append(_listed(robot, "gallery" if robot.is_arm else "other", alias))
     return robots
+
+
+def _listed(robot: ListedRobot, kind: str, alias: str = "") -> Choice:
+    title = f"{robot.robot} ({alias})" if alias else robot.robot
+    return Choice(robot.name, title, kind, robot.maker, robot.licence)
 
 
 def _uploaded(name: str, path: Path) -> Choice:
