@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 
@@ -19,8 +18,8 @@ from katana450.extensions.real_arm.servo.driver import ServoDriver
 from katana450.extensions.real_arm.servo.emulated_servos import EmulatedServos, calibration_text
 from katana450.extensions.real_arm.servo.joints import ServoJoints
 from katana450.extensions.real_arm.tool_travel import tool_travel
+from katana450.resources import INCLUDED
 from tests.real_arm.control_loop import SmallLoop, swing
-from tests.robot.public_arms import SO101, written
 
 PATIENCE = 15.0
 """[s] For anything that a loaded machine may do late."""
@@ -30,8 +29,8 @@ def calibration() -> Calibration:
     return decoded_calibration(calibration_text())
 
 
-def so101(folder: Path) -> Robot:
-    return load(written(folder, "so101", SO101))
+def so101() -> Robot:
+    return load(INCLUDED["so101"])
 
 
 @contextmanager

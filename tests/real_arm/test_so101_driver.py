@@ -45,7 +45,6 @@ from tests.real_arm.emulated_so101 import (
     so101,
     wait_until,
 )
-from tests.robot.public_arms import SO101, written
 
 ROUNDS = 50 if LONG else 1
 """Faults of each kind."""
@@ -54,8 +53,8 @@ IDS = tuple(range(1, 7))
 
 
 @pytest.fixture(scope="module")
-def arm(tmp_path_factory: pytest.TempPathFactory) -> Robot:
-    return so101(tmp_path_factory.mktemp("so101"))
+def arm() -> Robot:
+    return so101()
 
 
 @pytest.fixture
@@ -348,8 +347,7 @@ def test_arm_beyond_its_limit_does_not_jump(server: ServoServer, arm: Robot) -> 
     ("options", "message"),
     [
         ({"calibration": "c.json"}, "--calibration needs a real arm"),
-        ({"device": "tcp://h", "arm": "SO-101"}, "needs --calibration FILE"),
-        ({"device": "tcp://h", "arm": "so_arm100"}, "needs --calibration FILE"),
+        ({"device": "tcp://h"}, "needs --calibration FILE"),
         ({"device": "tcp://h", "calibration": "none.json"}, "cannot be read"),
         ({"device": "h", "calibration": "c.json"}, "is not the address of a device"),
     ],
@@ -357,12 +355,7 @@ def test_arm_beyond_its_limit_does_not_jump(server: ServoServer, arm: Robot) -> 
 def test_options_that_name_no_such_arm_are_refused(
     arm: Robot, options: dict[str, str], message: str
 ) -> None:
-    defaults: dict[str, object] = {
-        "device": None,
-        "arm": None,
-        "calibration": None,
-        "arm_log": None,
-    }
+    defaults: dict[str, object] = {"device": None, "calibration": None, "arm_log": None}
     paths = {name: Path(value) for name, value in options.items() if name == "calibration"}
     with pytest.raises(KatanaError, match=message):
         driver(Namespace(**defaults | options | paths), arm, np.zeros(5), 0.0)
@@ -370,11 +363,11 @@ def test_options_that_name_no_such_arm_are_refused(
 
 @pytest.mark.long
 def test_server_drives_the_emulated_process_by_its_page_requests(tmp_path: Path) -> None:
-    urdf, file = written(tmp_path, "so101", SO101), tmp_path / "calibration.json"
+    file = tmp_path / "calibration.json"
     with emulator_process("so101", "--calibration", str(file)) as (process, port):
         device = ("--device", f"tcp://127.0.0.1:{port}", "--calibration", str(file))
         with (
-            AppServer((*APP, "--urdf", str(urdf), *device)) as server,
+            AppServer((*APP, "--arm", "so101", *device)) as server,
             connect_client(server.url, "Ada") as client,
         ):
 

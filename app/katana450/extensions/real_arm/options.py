@@ -6,7 +6,6 @@ Nothing heavy is loaded before it is used.
 from __future__ import annotations
 
 import argparse
-import re
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -99,8 +98,9 @@ def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> D
                 option = "--" + name.replace("_", "-")
                 raise ConfigurationError(f"{option} needs a real arm: add --device ADDRESS.")
         return None
-    name = re.sub("[^a-z0-9]|arm", "", (getattr(options, "arm", None) or "").lower())
-    if options.calibration is not None or name in ("so100", "so101"):
+    from katana450.extensions.motor_bus.calibration import AXES
+
+    if options.calibration is not None or tuple(robot.require_arm().chain.names) == AXES:
         from katana450.extensions.real_arm.servo import driver as servo
 
         return servo.driver_of(options, robot, q, gripper)
