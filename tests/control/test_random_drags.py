@@ -22,9 +22,8 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import pitch_and_roll
 from katana450.maths.kinematics.velocity import tool_speed
-from katana450.resources import URDF_PATH
+from katana450.resources import INCLUDED
 from tests.conftest import LONG, MANY_DRAGS
-from tests.robot.public_arms import SO101, written
 
 TICK = 0.01
 
@@ -55,13 +54,10 @@ STRIDE = 0.002
         "pincherx_150",
     ]
 )
-def dragged(request: pytest.FixtureRequest, tmp_path: Path) -> Session:
+def dragged(request: pytest.FixtureRequest) -> Session:
     """A session of each arm, without collision checks."""
-    files = {
-        "katana450": URDF_PATH,
-        "pincherx_150": Path(__file__).parents[1] / "robot" / "arms" / "pincherx_150.urdf",
-    }
-    arm = load(files.get(request.param) or written(tmp_path, "so101", SO101)).require_arm()
+    pincherx_150 = Path(__file__).parents[1] / "robot" / "arms" / "pincherx_150.urdf"
+    arm = load(INCLUDED.get(request.param, pincherx_150)).require_arm()
     return Session(arm, arm.chain.clamp(np.zeros(5)))
 
 

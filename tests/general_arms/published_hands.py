@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from katana450.resources import INCLUDED
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.gripping_arms import HANDS, STAND
-from tests.robot.public_arms import PX150, SO101, J, Triple, X, urdf
+from tests.robot.public_arms import PX150, J, Triple, X, urdf
 
 ZERO: Triple = (0.0, 0.0, 0.0)
 
@@ -183,18 +184,10 @@ def hand_urdf(arm: str, hand: list[J | Box]) -> str:
     return chain_urdf("arm", HANDS[arm][0]).replace("</robot>", text)
 
 
-SO101_BOXES = [
-    Box("gripper_link", (0.05, 0.04, 0.04), (0.01, 0.0, -0.005)),
-    Box("gripper_link", (0.01, 0.03, 0.08), (-0.0129, 0.0, -0.06)),
-    Box("moving_jaw", (0.0356, 0.028, 0.02), (-0.00861, -0.00761, 0.0188), (0.0, 0.0, 0.174533)),
-    Box("moving_jaw", (0.01, 0.06, 0.02), (-0.01444, -0.04824, 0.0188), (0.0, 0.0, 0.174533)),
-]
-"""Housing and fixed jaw, and lever and blade of the moving one, about as large as the parts."""
-
-
 def so101_urdf() -> str:
-    """Return the URDF of an SO-101 with its two jaws."""
-    return _with_boxes(urdf("so101", SO101), SO101_BOXES)
+    """Return the URDF of the included SO-101, which names its meshes by their whole paths."""
+    file = INCLUDED["so101"]
+    return file.read_text("utf-8").replace('filename="', f'filename="{file.parent}/')
 
 
 PX150_BOXES = [

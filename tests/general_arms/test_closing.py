@@ -60,7 +60,8 @@ def gaps(session: Session, state: State, part: SceneObject) -> tuple[float, floa
     world = session.environment.world([part])
     assert world is not None
     one, other = (
-        world.gap(state.x_setpoint, "part", name) for name in ("moving_jaw", "gripper_link")
+        world.gap(state.x_setpoint, "part", name)
+        for name in ("moving_jaw_so101_v1_link", "gripper_link")
     )
     return one, other
 
