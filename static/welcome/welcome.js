@@ -6,11 +6,12 @@ import { ScriptRun } from "../teach/run.js";
 
 const KEPT = "katana450.welcome"; // in the browser's storage, once the card was dismissed
 const DONE = "katana450.welcome.done"; // the names of the steps that were done
-const SCRIPT = "api/v1/scripts/Pour";
+const SCRIPTS = "api/v1/scripts/";
 const PULSE_EVERY = 50; // ms
 const ID = "pour"; // id of the requests of the program
 const POUR = { name: "Pour", title: "Watch it pour", about: "The arm grasps the cup and empties it", did: "Poured. The cup is back in its place.", not: "It did not pour." };
 const WAVE = { name: "Wave", title: "Watch it move", about: "A program turns one joint to and fro", did: "Done. That was a program of three steps.", not: "It did not move." };
+const CIRCLE = { name: "Small circle", title: "Watch it move", about: "The arm draws a circle in the air", did: "Done. That was a program of four steps.", not: "It did not move." };
 const SWING = 20; // degrees to either side, at most
 const RADIANS = Math.PI / 180;
 const HANDLE = "/target/move";
@@ -43,7 +44,7 @@ export class Welcome {
     this.#arm = arm;
     this.#run = new ScriptRun(page.say, ID);
     const { status } = page.store;
-    if (status?.scripts) this.#program = arm.gripper && arm.tools.grasp ? POUR : WAVE;
+    if (status?.scripts) this.#program = arm.gripper && arm.tools.grasp ? POUR : arm.tools.gripper_frame_link ? CIRCLE : WAVE;
     const close = button("×", () => this.#dismiss(), { "aria-label": "Close for good" });
     const list = html("ol", {});
     if (arm.default_tool) list.append(this.#step("drag", "Drag the arrows", "Move the tool by its coloured handle", () => this.#drag()));
@@ -143,7 +144,7 @@ export class Welcome {
   // Return the text of the program.
   async #script() {
     if (this.#program === WAVE) return this.#wave((await readState())?.q ?? []);
-    return (await request(SCRIPT)).text();
+    return (await request(SCRIPTS + this.#program?.name)).text();
   }
 
   /** Turn the first joint that can turn to both sides of the posture q. @param {number[]} q */

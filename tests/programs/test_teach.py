@@ -13,10 +13,11 @@ from katana450.assembly.robot_session import describe_robot
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.run.simulation import plan_script
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import LIBRARY, Scripts
 from katana450.extensions.programs.script.teach import TaughtPose, taught
-from katana450.resources import URDF_PATH
+from katana450.resources import INCLUDED, URDF_PATH
 from katana450.settings import Settings
 from tests.general_arms.published_arms import UR5E
 from tests.programs.conftest import Stage
@@ -103,6 +104,9 @@ def test_scripts_of_the_library_are_offered_to_arms_with_their_tools(tmp_path: P
     assert scripts.offered(arm) == ("Mine", "Turn")
     bare = describe_robot(replace(Settings(), bare=True), URDF_PATH, None).session.require_arm()
     assert scripts.offered(bare) == ("Mine", "Circle", "Turn")
+    so101 = describe_robot(Settings(), INCLUDED["so101"], None).session.require_arm()
+    assert scripts.offered(so101) == ("Mine", "Small circle", "Turn")
+    plan_script(parse(scripts.text("Small circle")), INCLUDED["so101"])
     six = ArmModel(UR5E, {"flange": UR5E.M}, "flange", NO_GRIPPER, to_tool=DrivenTool)
     assert scripts.offered(six) == ("Mine", "Turn")
     assert len(scripts.offered(None)) == len(scripts.paths)
