@@ -1,6 +1,6 @@
 """Take the pictures of the robots in docs/gallery.md: ``python -m docs.robots [NAME...]``.
 
-This needs the extra ``gallery``, git and a network: the descriptions are downloaded on first use.
+All but so101 need the extra ``gallery``, git and a network: they are downloaded on first use.
 """
 
 from __future__ import annotations
