@@ -171,8 +171,7 @@ def test_past_is_shown_in_one_window_until_stop(
     page.wait_until(lambda: 0.1 < shown_turn(page) < 0.4, "the first motion")
     page.page.get_by_text("Continue from here").click()
     page.wait_until(lambda: page.shows(LINK) and not page.shows(GHOST), "the present")
-    truth.wait(moving=False)
-    assert truth.status()["q"][0] == pytest.approx(TURNS[0], abs=1e-6)
+    page.wait_until(lambda: abs(truth.status()["q"][0] - TURNS[0]) < 1e-6, "the end of the motion")
     page.page.locator("#timeline .marks i[title*='Continues from']").wait_for(state="attached")
     page.page.locator("#timeline .marks b.left").wait_for(state="attached")
     # What was before and after it is an episode, without what it was set back over.
