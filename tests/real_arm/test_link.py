@@ -53,7 +53,6 @@ def test_reply_in_pieces_is_complete() -> None:
         pieces += [bytes((byte,)), 0.003]
     with link_to(*pieces) as (link, _):
         assert link.exchange(requests.ReadPositions()) == POSITIONS
-        assert 0.03 < link.round_trips[-1] < 0.4
 
 
 def test_refusal_comes_with_its_reason_and_the_link_remains() -> None:

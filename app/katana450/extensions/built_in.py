@@ -118,12 +118,6 @@ EXTENSIONS = (
         "real_arm",
         (
             CliCommand(
-                "arm",
-                "probe a real arm: read what can be learned without a motion",
-                f"{HERE}.real_arm.options:add_arm_command_options",
-                f"{HERE}.real_arm.probe:probe",
-            ),
-            CliCommand(
                 "emulate",
                 "emulate the firmware of a Katana450 behind a TCP port",
                 f"{HERE}.real_arm.options:add_emulate_options",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import time
-from collections import deque
 from collections.abc import Callable
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
@@ -79,14 +78,11 @@ EXCHANGE_TIMEOUT = 0.3
 """[s] Deadline of an exchange. With the time between two exchanges it is less than the silence for
 which the driver takes an arm for lost."""
 
-KEPT_ROUND_TRIPS = 1000
-
 
 class ArmLink:
     """An arm that answers requests, one at a time.
 
     Attributes:
-        round_trips: Times of the newest exchanges [s].
         heard_at: Time at which the newest request that the arm has answered was sent [s], at first
             that of the connection. A reply that is read late counts for no longer.
     """
@@ -105,7 +101,6 @@ class ArmLink:
         self._codec = HostCodec()
         self._is_lost = False
         self.heard_at = clock()
-        self.round_trips: deque[float] = deque(maxlen=KEPT_ROUND_TRIPS)
 
     def exchange(self, request: ArmRequest, timeout: float = EXCHANGE_TIMEOUT) -> ArmReply:
         """Return the reply of the arm to ``request``.
@@ -145,7 +140,6 @@ class ArmLink:
             self.close()
             raise LinkLostError(str(error)) from None
         self.heard_at = start
-        self.round_trips.append(self._clock() - start)
         return reply
 
     def _read(self, deadline: float) -> bytes:

@@ -1,4 +1,4 @@
-"""Options of ``katana450 emulate``, ``arm`` and ``serve``, and the choice of driver and view.
+"""Options of ``katana450 emulate`` and ``serve``, and the choice of driver and view.
 
 Nothing heavy is loaded before it is used.
 """
@@ -52,21 +52,6 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="calibrate N times as fast, for tests (default: %(default)g)",
     )
-
-
-def add_arm_command_options(parser: argparse.ArgumentParser) -> None:
-    """Add the subcommand probe of ``katana450 arm`` to ``parser``."""
-    parser.description = STOP_BUTTON
-    acts = parser.add_subparsers(dest="act", required=True, metavar="probe")
-    probe = acts.add_parser(
-        "probe",
-        help="ask an arm all that can be learned without a motion, and write a report",
-        description=f"Only reads: nothing moves. {STOP_BUTTON}",
-    )
-    probe.add_argument(
-        "--out", type=Path, metavar="FILE", help="report as JSON (default: named by the time)"
-    )
-    probe.add_argument("url", metavar="URL", help=ADDRESS_HELP)
 
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
