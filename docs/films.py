@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
 from io import BytesIO
 from pathlib import Path
 
-import imageio.v3 as imageio
 import numpy as np
 from PIL import Image
 
 from docs.pictures import IMAGES, MOVE, at_rest
+from katana450.extensions.media.stage import Shot, rendering_pool
+from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import library_file, script_text
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
 from tests.browser.camera import Camera, Drawing
 from tests.browser.chromium import launched
 from tests.browser.page import Axis, ViserPage
@@ -70,11 +74,10 @@ def drag() -> Iterable[Image.Image]:
 
 def run(script: str, region: tuple[int, int, int, int], fps: int) -> Iterable[Image.Image]:
     """Yield frames of a script, drawn from its plan and cut to ``region``."""
-    with tempfile.TemporaryDirectory() as folder:
-        film = Path(folder, "run.mp4")
-        options = ["--run", script, "--out", str(film), "--size", "1280x800", "--fps", str(fps)]
-        subprocess.run([sys.executable, "-m", "katana450", "render", *options], check=True)
-        yield from (Image.fromarray(frame).crop(region) for frame in imageio.imiter(film))
+    plan = plan_script(parse(script_text(Path(script))), URDF_PATH)
+    states = run_by_clock(plan).states[:: round(Settings().rate / fps)]
+    with rendering_pool((Shot("free", (1280, 800)),), URDF_PATH, False, len(states)) as rendered:
+        yield from (Image.fromarray(frame).crop(region) for (frame,) in rendered(iter(states)))
 
 
 def shot(page: ViserPage) -> Image.Image:
@@ -110,7 +113,7 @@ def save(name: str, frames: Iterable[Image.Image]) -> Path:
 
 FILMS: dict[str, Callable[[], Iterable[Image.Image]]] = {
     "drag": drag,
-    "pour": lambda: run("pour", POUR_REGION, 4),
+    "pour": lambda: run(str(library_file("pour")), POUR_REGION, 4),
     "tower": lambda: run("examples/programs/tower.yaml", TOWER_REGION, 12),
 }
 

@@ -1,8 +1,7 @@
-"""Films of runs as a person makes them, and Ctrl-C during a film."""
+"""Ctrl-C during a film of a recording."""
 
 from __future__ import annotations
 
-import re
 import signal
 import subprocess
 import sys
@@ -10,38 +9,21 @@ import time
 from pathlib import Path
 
 import pytest
-from imageio_ffmpeg import get_ffmpeg_exe
 
-from tests.commands import completed
+from tests.recording.recorded import record, swinging
 
 pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).resolve().parents[2]
 
-SCRIPT = "steps:\n  - joints: [20, -68, 85, 8, 0]\n"
-
-
-def command(*words: str) -> list[str]:
-    return [sys.executable, "-m", "katana450", *words]
-
-
-def test_a_film_of_a_motion(tmp_path: Path) -> None:
-    (tmp_path / "m.yaml").write_text(SCRIPT)
-    path = tmp_path / "m.mp4"
-    words = ("--run", str(tmp_path / "m.yaml"), "--size", "160x100", "--fps", "10")
-    subprocess.run(command("render", "--out", str(path), *words), cwd=ROOT, check=True, timeout=120)
-    output = completed([get_ffmpeg_exe(), "-i", str(path)]).stderr
-    assert "160x100" in output
-    assert "10 fps" in output
-    assert re.search(r"Duration: 00:00:0[1-5]\.\d0", output)
-
 
 def test_ctrl_c_leaves_no_partial_film(tmp_path: Path) -> None:
-    path = tmp_path / "film" / "m.mp4"
+    run, path = tmp_path / "run.mcap", tmp_path / "film" / "m.mp4"
+    record(run, 2000, commands=swinging)
     path.parent.mkdir()
-    words = ("--run", "pour", "--size", "160x100")
+    words = ("--format", "mp4", "--out", str(path), "--size", "160x100")
     with subprocess.Popen(
-        command("render", "--out", str(path), *words),
+        [sys.executable, "-m", "katana450", "record", "export", str(run), *words],
         cwd=ROOT,
         stderr=subprocess.PIPE,
         text=True,

@@ -15,9 +15,12 @@ import pytest
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.extensions.export.mjcf import SAG, keyframes
-from katana450.extensions.export.playback import of_script
+from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
+from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.links_of_arms import ur5e
@@ -169,13 +172,14 @@ def test_arm_holds_itself_for_five_seconds(model: mujoco.MjModel, key: str) -> N
 @pytest.mark.long
 def test_drives_follow_the_circle(model: mujoco.MjModel, katana: Robot) -> None:
     """The actuators, given the joint angles of the demo, follow with a small lag."""
-    shown = of_script("circle", URDF_PATH)
+    plan = plan_script(parse(script_text(library_file("circle"))), URDF_PATH)
+    states = run_by_clock(plan).states
     data = mujoco.MjData(model)
-    first = katana.joint_values(shown.states[0].q, shown.states[0].gripper)
+    first = katana.joint_values(states[0].q, states[0].gripper)
     set_values(model, data, first)
     worst = 0.0
-    steps = round(1.0 / shown.rate / model.opt.timestep)
-    for state in shown.states[:300]:
+    steps = round(1.0 / Settings().rate / model.opt.timestep)
+    for state in states[:300]:
         values = katana.joint_values(state.q, state.gripper)
         for name in katana.driven:
             data.actuator(name).ctrl[0] = values[name]

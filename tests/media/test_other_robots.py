@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from katana450.assembly.robot_session import find_robot
 from katana450.cli.main import main
-from katana450.extensions.export.playback import of_pose
+from katana450.extensions.media.posed import posed
 from katana450.resources import URDF_PATH
 from katana450.server.view.cameras import camera_pose
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
-from katana450.settings import Settings
 from tests.general_arms.links_of_arms import ur5e
 from tests.robot.hands import hand
 
@@ -32,8 +30,7 @@ def urdf(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 @pytest.mark.cases(4)
 @pytest.mark.parametrize("preset", CAMERA_POSES)
 def test_named_views_show_the_whole_robot(urdf: Path, preset: Preset) -> None:
-    robot, session, _ = find_robot(Settings(), urdf, None)
-    state = of_pose((), urdf).at(0.0)
+    robot, session, state = posed((), urdf)
     look = camera_pose(preset, robot, state)
     eye = np.array(look.position)
     view_axis = np.subtract(look.target, eye) / np.linalg.norm(np.subtract(look.target, eye))
@@ -57,8 +54,7 @@ def test_named_views_show_the_whole_robot(urdf: Path, preset: Preset) -> None:
 
 
 def test_katana_keeps_its_views() -> None:
-    robot, _, _ = find_robot(Settings(), URDF_PATH, None)
-    state = of_pose((), URDF_PATH).at(0.0)
+    robot, _, state = posed((), URDF_PATH)
     for preset, look in CAMERA_POSES.items():
         assert camera_pose(preset, robot, state) == look
 

@@ -70,7 +70,7 @@ EXTENSIONS = (
         (
             CliCommand(
                 "render",
-                "render a picture or a film of the arm, without a browser",
+                "render a picture of the arm, without a browser",
                 f"{HERE}.media.options:add_render_options",
                 f"{HERE}.media.render:render",
             ),

@@ -19,11 +19,9 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         required=True,
         metavar="FILE",
-        help=".png for a picture, .mp4 for a film",
+        help="picture, a .png file",
     )
-    shown = parser.add_mutually_exclusive_group()
-    add_pose_option(shown, "Home")
-    shown.add_argument("--run", metavar="SCRIPT", help="run: circle, pour or the file of a script")
+    add_pose_option(parser, "Home")
     parser.add_argument(
         "--camera", choices=CAMERAS, default=CAMERAS[0], help="view (default: %(default)s)"
     )
@@ -33,8 +31,5 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         default=(1280, 720),
         metavar="WxH",
         help="pixels (default: 1280x720)",
-    )
-    parser.add_argument(
-        "--fps", type=float, default=25.0, help="pictures per second (default: %(default)g)"
     )
     add_arm_options(parser, tool=False)
