@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from importlib.util import module_from_spec, spec_from_file_location
+from runpy import run_path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -21,18 +22,8 @@ from tests.waiting import state_when
 
 FILE = ROOT / "plugins" / "lerobot_robot_katana450" / "lerobot_robot_katana450" / "served_arm.py"
 
-
-def loaded() -> Any:
-    """Return the module without the package around it, which needs LeRobot."""
-    spec = spec_from_file_location("served_arm", FILE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-PLUGIN = loaded()
+PLUGIN = SimpleNamespace(**run_path(str(FILE)))
+"""The module without the package around it, which needs LeRobot."""
 
 
 @pytest.fixture
@@ -95,7 +86,7 @@ def test_setpoints_of_another_driver_are_actions_ahead_of_time(arm: Any, ada: Cl
     first, *others = ada.query(answers.State).setpoint
     ada.ask(requests.Joints(q=np.array([first + 0.3, *others])))
     state_when(ada, lambda state: abs(state.qd[0]) > 0.1)
-    later, now = arm.setpoint(0.1), arm.setpoint(0.0)
+    now, later = arm.setpoint(0.0), arm.setpoint(0.1)
     assert later["theta1.pos"] > now["theta1.pos"]
     state_when(ada, lambda state: not state.moving)
     assert arm.setpoint(0.1) == arm.measured()
