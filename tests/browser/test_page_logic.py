@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import pytest
@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page
 
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import TaughtPose, taught
-from katana450.extensions.recording.files.spans import Span, at_place, place_of
+from katana450.extensions.recording.files.spans import Span, at_place
 from tests.browser.bare_page import bare_page, load, module
 
 
@@ -506,6 +506,10 @@ def test_axis_of_the_timeline_is_that_of_the_server(page: Page) -> None:
     spans = [Span(10.0, 12.0), Span(20.0, 25.0), Span(40.0, 41.5)]
     places = [-1.0, 0.0, 1.5, 2.0, 2.5, 7.0, 7.5, 9.0]
     times = [9.0, 10.0, 11.5, 15.0, 20.0, 23.0, 30.0, 41.5, 50.0]
+
+    def place_of(spans: Sequence[Span], t: float) -> float:
+        return sum(min(max(t - span.start, 0.0), span.length) for span in spans)
+
     for function, ours, values in (("atPlace", at_place, places), ("placeOf", place_of, times)):
         call = f"(axis, spans, values) => values.map((each) => axis.{function}(spans, each))"
         shown = module(page, "timeline/axis.js", call, spans, values)

@@ -42,7 +42,6 @@ from katana450.extensions.recording.files.spans import (
     Span,
     at_place,
     length_of,
-    place_of,
     spans_of,
 )
 from katana450.extensions.recording.folders import recordings_in
@@ -344,8 +343,6 @@ def test_axis_leaves_out_the_rests() -> None:
     assert length_of(spans) == 7.0
     for place, t in ((0.0, 10.0), (2.5, 12.5), (3.5, 100.5), (7.0, 104.0)):
         assert at_place(spans, place) == t
-        assert place_of(spans, t) == place
-    assert place_of(spans, 50.0) == 3.0
     assert (at_place(spans, -1.0), at_place(spans, 99.0)) == (10.0, 104.0)
     assert at_place((), 1.0) == 0.0
 

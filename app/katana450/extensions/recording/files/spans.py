@@ -49,16 +49,6 @@ def at_place(spans: Sequence[Span], place: float) -> float:
     return spans[-1].end if spans else 0.0
 
 
-def place_of(spans: Sequence[Span], t: float) -> float:
-    """Return the place [s] of ``t`` [s] on the axis; inside a rest, that of its start."""
-    place = 0.0
-    for span in spans:
-        if t < span.start:
-            break
-        place += min(t, span.end) - span.start
-    return place
-
-
 def length_of(spans: Iterable[Span]) -> float:
     """Return the length [s] of the axis."""
     return sum(span.length for span in spans)
