@@ -20,13 +20,6 @@ if TYPE_CHECKING:
     from katana450.maths.geometry.arrays import FloatArray
     from katana450.sdk import ViewLayer
 
-STOP_BUTTON = (
-    "No program is a safety device: a hardware stop button that cuts the power of the arm stays "
-    "necessary, within reach of the person beside it."
-)
-
-ADDRESS_HELP = "address of the arm: tcp://HOST, tcp://HOST:PORT, or a serial port as /dev/ttyUSB0"
-
 
 def add_emulate_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 emulate`` to ``parser``."""
@@ -59,7 +52,9 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--device",
         metavar="ADDRESS",
-        help=f"drive a real arm. {ADDRESS_HELP[0].upper()}{ADDRESS_HELP[1:]}. {STOP_BUTTON}",
+        help="drive a real arm at tcp://HOST, tcp://HOST:PORT, or a serial port as /dev/ttyUSB0. "
+        "No program is a safety device: a hardware stop button that cuts the power of the arm "
+        "stays necessary, within reach of the person beside it.",
     )
     parser.add_argument(
         "--calibration",
