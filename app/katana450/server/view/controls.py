@@ -119,7 +119,8 @@ def set_value(handle: Any, value: object) -> None:
 
 def set_slider(slider: viser.GuiSliderHandle[float], value: float) -> None:
     """Show ``value``, clipped to the ends, if it differs from the value that is shown."""
-    # Rounded beyond the digits that are shown, so that no slider shows "-0.00".
-    value = min(max(round(value, 6) + 0.0, slider.min), slider.max)
+    # No slider shows "-0.00".
+    value = round(value, 6) if round(value, slider.precision or 0) else 0.0
+    value = min(max(value, slider.min), slider.max)
     if abs(slider.value - value) > WORTH_SENDING:
         set_value(slider, value)
