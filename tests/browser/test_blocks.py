@@ -134,7 +134,7 @@ def test_words_for_a_value_have_quotes_where_yaml_needs_them(browser: Browser) -
             ("- via:\n    through: [up]", -1, "0.5", "- via:\n    blend: 0.5\n    through: [up]"),
             (
                 "- line:\n    by: {z: 1}\n    feed: 9",
-                -1,
+                -2,
                 "3",
                 "- line:\n    by: {z: 1}\n    feed: 9\n    yaw: 3",
             ),

@@ -120,6 +120,12 @@ def test_values_have_the_names_of_the_schema(step: str, names: list[str]) -> Non
     assert {value.options for value in block.values if value.name == "move"} <= {("up",)}
 
 
+def test_values_have_one_order_without_those_that_the_arm_cannot_have() -> None:
+    text = "steps: [{line: {feed: 3, to: up}}]"
+    (block,) = blocks_of(read(text), text, {"unsuited": ("yaw",)})
+    assert [value.name for value in block.values] == ["to", "pitch", "roll", "feed"]
+
+
 def test_comments_that_are_no_steps_change_nothing() -> None:
     text = "steps:\n  - home\n  # - homes\n  # - wait: [1\n  # a list: - home\n"
     assert [block.title for block in blocks(text)] == ["home"]

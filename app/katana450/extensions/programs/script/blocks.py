@@ -20,8 +20,8 @@ from katana450.extensions.programs.script.script import KNOWN_STEPS, STEP_VALUES
 from katana450.extensions.programs.script.step_values import (
     Names,
     StepValue,
-    absent_values,
     names_in,
+    step_values,
     values_of,
 )
 
@@ -150,11 +150,12 @@ def _values(step: YamlValue, source: _Source) -> Iterator[StepValue]:
     """Yield the values of a step; those of one that is commented out stand behind its ``# ``."""
     for name, held in step.fields if step.kind == "mapping" else ():
         schema = STEP_VALUES.get(str(name.held), {})
-        for value in values_of(held, schema, source.names, _words(name)):
-            shift = 2 * (value.line in source.disabled)
-            yield msgspec.structs.replace(value, column=value.column + shift, end=value.end + shift)
-        if name.held in STEPS and step.line not in source.disabled:
-            yield from absent_values(held, schema, source.names)
+        values = step_values if name.held in STEPS else values_of
+        shift = 2 * (step.line in source.disabled)
+        for value in values(held, schema, source.names, _words(name)):
+            if not (shift and value.before):
+                place = {"column": value.column + shift, "end": value.end + shift}
+                yield msgspec.structs.replace(value, **place)
 
 
 def _comment_column(line: str) -> int:

@@ -102,7 +102,27 @@ def values_of(
         yield _scalar(value, variants, names, name)
 
 
-def absent_values(value: YamlValue, schema: Schema, names: Names) -> Iterator[StepValue]:
+def step_values(value: YamlValue, schema: Schema, names: Names, name: str) -> list[StepValue]:
+    """Return the values of a step, also those that it may have, in the order of ``schema``.
+
+    Args:
+        value: what the step takes.
+        schema: describes it.
+        names: known names; ``unsuited`` are fields that the arm cannot have.
+        name: the step for people.
+    """
+    properties = [kind.get("properties", ()) for kind in _variants(schema)]
+    words = [f"{key} ".replace("_", " ") for keys in properties for key in keys]
+
+    def place(field: StepValue) -> int:
+        # The name of a part begins with that of the whole.
+        return next((i for i, word in enumerate(words) if f"{field.name} ".startswith(word)), -1)
+
+    fields = [*values_of(value, schema, names, name), *_absent(value, schema, names)]
+    return sorted(fields, key=place)
+
+
+def _absent(value: YamlValue, schema: Schema, names: Names) -> Iterator[StepValue]:
     """Yield the plain values that the step ``value``, which ``schema`` describes, may also have."""
     mappings = [kind for kind in _variants(schema) if "properties" in kind]
     line, column, end, after = value.line, value.column, value.end, ""
@@ -124,7 +144,8 @@ def absent_values(value: YamlValue, schema: Schema, names: Names) -> Iterator[St
         return
     mapping = next((kind for kind in mappings if set(present) <= set(kind["properties"])), {})
     excluded = mapping.get("not", {}).get("required", ())
-    hidden = {*present, *(excluded if set(excluded) & set(present) else ())}
+    hidden = {*present, *names.get("unsuited", ())}
+    hidden |= set(excluded if set(excluded) & set(present) else ())
     for name, part in mapping.get("properties", {}).items():
         variants = tuple(_variants(part))
         types = {kind.get("type", "string") for kind in variants if {"type", "enum"} & set(kind)}
@@ -142,6 +163,8 @@ def _scalar(value: YamlValue, variants: Iterable[Schema], names: Names, name: st
     about = next((kind["description"] for kind in variants if "description" in kind), "")
     step = 0.0
     if numeric is not None and value.kind in ("whole", "number"):
+        # Its field takes numbers alone.
+        about = about.partition(", or a text")[0]
         step = FINE_STEP if numeric["maximum"] - numeric["minimum"] <= FINE_RANGE else 1.0
     return StepValue(
         name,

@@ -88,6 +88,9 @@ class ScriptRoutes:
             names["axes"] = axes = dict(zip(arm.robot.joint_labels, ends, strict=True))
             names["objects"] = [body.name for body in arm.state.objects]
             names["tools"] = () if arm.robot.arm is None else arm.robot.arm.tools
+            names["unsuited"] = (
+                ("yaw",) if arm.robot.arm and arm.robot.arm.kinematics.is_pitched else ()
+            )
 
         def reading(text: str) -> Response:
             answer: dict[str, Any] = {"problems": (), "taught": None, "blocks": None}
