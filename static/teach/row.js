@@ -11,7 +11,7 @@ const SHAPES = {
   go: "M3 10h12M10 4.5 15.5 10 10 15.5",
   up: "M10 16V4M4.5 9.5 10 4l5.5 5.5",
   down: "M10 4v12M4.5 10.5 10 16l5.5-5.5",
-  remove: "M5 5l10 10M15 5 5 15",
+  remove: "M4 6h12M8 6V4h4v2M6 6l1 11h6l1-11",
   grip: "M7 17v-4L3.5 9.5V3M13 17v-4l3.5-3.5V3M7 13h6",
   blend: "M3 16c9 0 3-12 14-12",
   copy: "M7 7h9v9H7zM4 13V4h9",

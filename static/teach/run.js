@@ -40,10 +40,7 @@ export class ScriptRun {
   // Send `text` and give the order `run` or `step`; null only plans it. Return the last progress of the program.
   // Throws an error with the reason for a refusal. `shows` gets each progress.
   // revocations: of the status at the press; after a stop the requests are refused.
-  /**
-   * @param {string} text @param {Api.ProgramOrder | null} order @param {number | undefined} revocations
-   * @param {(program: Api.Progress) => void} [shows]
-   */
+  /** @param {string} text @param {Api.ProgramOrder | null} order @param {number | undefined} revocations @param {(program: Api.Progress) => void} [shows] */
   async play(text, order, revocations, shows) {
     this.busy = true;
     try {
@@ -80,18 +77,21 @@ export class ScriptRun {
   }
 
   // Return the last progress of the program that runs. One that a stop or another command has kept from running stays
-  // planned, with a reason; `planned`: one that is not to run, too.
+  // planned, with a reason; `planned`: one that is not to run, too. Throws an error if the server was started again.
   /** @param {(program: Api.Progress) => void} [shows] */
   async follow(shows, planned = false) {
-    this.busy = true;
-    for (; ; await pause(EVERY)) {
-      const program = (await readState())?.program;
-      if (!program) continue;
+    for (this.busy = true; this.busy; await pause(EVERY)) {
+      const state = await readState();
+      if (!state) continue;
+      const { program } = state;
+      this.busy = program !== null;
+      if (!program) break;
       shows?.(program);
       const kept = planned || program.why.startsWith("Not run");
       if (!ENDS.includes(program.status) && !(kept && program.status === "ready")) continue;
       this.busy = false;
       return program;
     }
+    throw new Error("The server was started again, and has no program.");
   }
 }

@@ -184,7 +184,7 @@ def test_arm_that_calibrates_is_not_shown_as_stopped(stack: ExitStack, windows: 
     card.shows("Arm uncalibrated")
     card.shows("STOP ended the calibration", place="#arm [role=status]")
     card.shows("Stopped", place="#headline")
-    assert page.inner_text("#why").endswith("Nothing moves until Clear stop is pressed.")
+    assert page.inner_text("#why").endswith("Press Clear stop to continue.")
     assert card.window.errors == []
 
 

@@ -81,9 +81,9 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
     assert other.page.locator("#stop.asked").count() == 0
     # Clear stop is offered only to a person who may use it; the other page names that person.
     assert offers_clear_stop(driver)
-    assert bar(driver, "why").endswith("Nothing moves until Clear stop is pressed.")
+    assert bar(driver, "why").endswith("Press Clear stop to continue.")
     assert not offers_clear_stop(other)
-    assert bar(other, "why").endswith(f"Nothing moves until {me} clears the stop.")
+    assert bar(other, "why").endswith(f"{me} can clear the stop.")
     other.keep(artefacts / "stop-of-another.png")
     driver.press_in_bar("Clear stop")
     other.wait_until(lambda: mood(other.page) == "ok", "the stop to be cleared")

@@ -218,7 +218,7 @@ def test_clear_stop_is_offered_with_the_reason_to_wait(table: ClearingTable) -> 
     # A person who may not clear it learns that, and gets no lease.
     with pytest.raises(LeaseError, match="holds the arm"):
         table.hub.move(other, cmd.ClearStop())
-    until = f"Nothing moves until {driver.person.name} clears the stop."
+    until = f"{driver.person.name} can clear the stop."
     assert status.of(table.hub, other)["until"] == until
     table.arm.clear_refusal = ""
     assert status.common(table.hub)["wait"] == ""

@@ -14,10 +14,11 @@ from typing import Any
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Actor, CommandChannel, Lease, Person
+from katana450.arm.control.session.goals import without_finding
 from katana450.arm.control.session.stopping import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state.findings import entries_between
 from katana450.arm.control.state.messages import finding_text, sentence
-from katana450.arm.control.state.state import State
+from katana450.arm.control.state.state import Reason, State
 from katana450.arm.control.state.stop_cause import StopCause, pressed
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
@@ -146,7 +147,7 @@ class Hub:
         """Reason of the present stop or pause by the server; None without one."""
         arm = self.arm
         if self.stopped is None and arm is not None and arm.caught_up and arm.state.waits:
-            return sentence(arm.state)
+            return sentence(without_finding(arm.state, Reason.PAUSED))
         return None if self.stopped is None else self.stopped.why
 
     # Participants

@@ -172,8 +172,7 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     own_stop = None if stopped is None or stopped.cause.key != person.key else stopped.why
     clears = hub.gate.may_clear(person)
     clearer = "an operator" if lease.driver is None else lease.driver.name
-    until = "Clear stop is pressed" if clears else f"{clearer} clears the stop"
-    stays = f"Nothing moves until {until}."
+    stays = "Press Clear stop to continue." if clears else f"{clearer} can clear the stop."
     if (mode := arm_mode(hub)) in UNCONTROLLED:
         stays = UNCONTROLLED[mode][1]
     return {
