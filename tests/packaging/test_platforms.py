@@ -93,14 +93,17 @@ def used_names(source: str) -> Iterator[str]:
                 yield attr
             case ast.Attribute(value=ast.Name(id="self")):
                 continue
-            # The method ``poll`` of a pipe or a process does not need select.
-            case ast.Attribute(value=value, attr="poll") if ast.unparse(value) != "select":
+            # Other things than select and os have methods of these names.
+            case ast.Attribute(value=value, attr="poll" | "fork") if ast.unparse(value) not in (
+                "select",
+                "os",
+            ):
                 continue
             case ast.Attribute(attr=attr) if attr in NAMES:
                 yield attr
             case ast.keyword(arg=str(arg)) if arg in NAMES:
                 yield arg
-            case ast.Constant(value=str(text)) if text in NAMES - {"poll", "nice"}:
+            case ast.Constant(value=str(text)) if text in NAMES - {"fork", "poll", "nice"}:
                 yield text
             case ast.Constant(value=str(text)) if text.startswith(PATHS):
                 yield text
