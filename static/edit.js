@@ -8,10 +8,7 @@ const STEPS = /** @type {const} */ (["undo", "redo"]);
 let page;
 /** @type {Parts} */
 let parts;
-/**
- * What a change needs of the parts of the page that are loaded later.
- * @typedef {Pick<import("./page/parts.js").Parts, "stage" | "teach" | "replay">} Parts
- */
+/** @typedef {Pick<import("./page/parts.js").Parts, "stage" | "teach" | "replay">} Parts those that are loaded later */
 /** @type {Record<Step, string[]>} */
 let changes = { undo: [], redo: [] }; // names of what can be undone and redone, the newest first
 let revocations = 0; // number of stops and changes of driver: an undo from before the next one is refused

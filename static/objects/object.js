@@ -16,6 +16,7 @@ const MOUNTS = [
 
 /** @type {[string, Api.Zone][]} */
 const ZONES = [["None: it is a body", "none"], ["The arm keeps out", "keep_out"], ["The arm is slow", "slow"]];
+const NEW_BOX = /** @type {Partial<Api.Place>} */ ({ shape: "box", size: [0.03, 0.03, 0.05], zone: "none", can_be_held: true }); // m
 const NEW_ZONE = /** @type {Partial<Api.Place>} */ ({ shape: "box", size: [0.2, 0.2, 0.2] }); // m
 const NEW_PLANE = /** @type {Partial<Api.Place>} */ ({ shape: "plane", size: [0.8, 0.6], T: [[1, 0, 0, 0.3], [0, 0, -1, 0.45], [0, 1, 0, 0.3], [0, 0, 0, 1]] }); // m
 
@@ -61,8 +62,9 @@ export class ObjectForm {
     this.#hidden.addEventListener("change", () => this.#act({ do: "place", name: this.#name, hidden: this.#hidden.checked }));
     this.#choice.addEventListener("change", () => this.#show(true));
     this.#zone.addEventListener("change", () => this.#act({ do: "place", name: this.#name, zone: /** @type {Api.Zone} */ (this.#zone.value) }));
-    onClick("add-zone", () => this.#addZone("zone", NEW_ZONE));
-    onClick("add-plane", () => this.#addZone("plane", NEW_PLANE));
+    onClick("add-box", () => this.#add("box", NEW_BOX));
+    onClick("add-zone", () => this.#add("zone", NEW_ZONE));
+    onClick("add-plane", () => this.#add("plane", NEW_PLANE));
     this.element.append(
       // What is in the legend stays in use while the rest is not.
       html("legend", {}, this.#choice, this.#remove),
@@ -78,7 +80,8 @@ export class ObjectForm {
     );
     window.addEventListener("selected", (event) => {
       const name = /** @type {CustomEvent<string>} */ (event).detail;
-      if (this.#objects.some((object) => object.name === name)) this.#choice.value = name;
+      if (!this.#objects.some((object) => object.name === name)) return;
+      this.#choice.value = name;
       this.#show(true);
     });
   }
@@ -113,7 +116,7 @@ export class ObjectForm {
   }
 
   /** @param {string} word @param {Partial<Api.Place>} fields */
-  #addZone(word, fields) {
+  #add(word, fields) {
     let number = 1;
     while (this.#objects.some(({ name }) => name === `${word} ${number}`)) number += 1;
     this.#act({ do: "place", name: `${word} ${number}`, zone: "keep_out", ...fields });
@@ -152,6 +155,7 @@ export class ObjectForm {
     const object = this.#object;
     this.element.hidden = !this.#objects.length;
     this.element.classList.toggle("none", !object);
+    if (again) window.dispatchEvent(new CustomEvent("chosen", { detail: this.#name }));
     if (!object || (!again && (this.#sender || performance.now() - this.#acted < HELD || this.element.matches(":active")))) return;
     const { colour, opacity, size, scale, hidden, T, held, zone } = object;
     this.#colour.value = colour ?? PLAIN;

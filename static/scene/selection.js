@@ -31,6 +31,8 @@ export class Selection {
     const clear = button("×", () => this.clear(), { "aria-label": "Deselect" });
     this.#bar = html("div", { id: "selection", role: "group", "aria-label": "Selected object", hidden: "" }, this.#name, remove, clear);
     stage.append(this.#bar);
+    // The sheet of objects shows another one.
+    window.addEventListener("chosen", (event) => /** @type {CustomEvent<string>} */ (event).detail !== this.#object?.name && this.clear());
   }
 
   /** Select the object that a node shows, whose bar is shown near a pixel; null for none. @param {Three.Object3D | null} node @param {Page.Pixel} pixel */
