@@ -69,6 +69,19 @@ export function styled(name, url) {
   return new Promise((done) => ["load", "error"].forEach((kind) => link.addEventListener(kind, done)));
 }
 
+// Act on the choice in a closed list. A key changes it at once, and Enter confirms it.
+/** @param {HTMLSelectElement} list @param {() => void} act */
+export function onConfirm(list, act) {
+  let byKeys = false;
+  list.addEventListener("pointerdown", () => (byKeys = false));
+  list.addEventListener("keydown", ({ key }) => {
+    if (key === "Enter") act();
+    byKeys = true;
+  });
+  list.addEventListener("change", () => byKeys || act());
+  list.addEventListener("blur", () => (list.value = ""));
+}
+
 // Whether the target of an event, of this document or of viser's, matches a selector.
 /** @param {EventTarget | null} target @param {string} selector @returns {target is HTMLElement} */
 export const matches = (target, selector) => Boolean(/** @type {Partial<Element> | null} */ (target)?.matches?.(selector));

@@ -1,6 +1,6 @@
 // The buttons of the lease: take, request, give and release the arm.
-import { t } from "../dom.js";
-import { button } from "../instruments/shape.js";
+import { onConfirm, t } from "../dom.js";
+import { button, html } from "../instruments/shape.js";
 
 const MAIN = { class: "main" };
 
@@ -35,20 +35,9 @@ export function leaseControls(status, say) {
 
 /** @param {Page.Named[]} others @param {Page.Say} say */
 function handOver(others, say) {
-  const list = document.createElement("select");
-  list.setAttribute("aria-label", "Give to");
-  list.add(new Option("Give to …", ""));
-  for (const { number, name } of others) list.add(new Option(name, String(number)));
-  // On a closed list, a key changes the choice at once; it is sent by Enter.
-  let byKeys = false;
-  const give = () => list.value && say({ do: "give", to: Number(list.value) });
-  list.addEventListener("pointerdown", () => (byKeys = false));
-  list.addEventListener("keydown", ({ key }) => {
-    if (key === "Enter") give();
-    byKeys = true;
-  });
-  list.addEventListener("change", () => byKeys || give());
-  list.addEventListener("blur", () => (list.value = ""));
+  const choices = others.map(({ number, name }) => new Option(name, String(number)));
+  const list = html("select", { "aria-label": "Give to" }, new Option("Give to …", ""), ...choices);
+  onConfirm(list, () => list.value && say({ do: "give", to: Number(list.value) }));
   return list;
 }
 

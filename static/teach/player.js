@@ -46,11 +46,11 @@ export class Player {
     /** The index of the pose of a line; null for another line. @param {number} line */
     const poseAt = (line) => (isText ? null : scriptOf(now).poseAt(line));
     sheet.report("Planning …");
-    const program = await this.run.play(text, order, revocations, ({ status, fraction, line, task }) => {
+    const program = await this.run.play(text, order, revocations, ({ status, fraction, line, step, steps, task }) => {
       if (status === PLANNING) return sheet.report(`Planning ${Math.round(100 * fraction)} %`);
       const index = poseAt(line);
       if (index !== null) sheet.mark(now.poses[index].id);
-      sheet.report(index === null ? `Line ${line}: ${task}` : `Pose ${index + 1} of ${now.poses.length}`);
+      sheet.report(index === null ? `Step ${step} of ${steps}: ${task}.` : `Pose ${index + 1} of ${now.poses.length}`);
     });
     const { status, steps, seconds, why } = program;
     if (status === "ready" && !order) sheet.report(`${steps} steps, about ${seconds.toFixed(1)} s.`);

@@ -1,5 +1,5 @@
 // Scripts in files: those of the server's folder, and those of the person.
-import { onChoice, save } from "../dom.js";
+import { onChoice, onConfirm, save } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { request } from "../server.js";
 
@@ -19,7 +19,7 @@ export class Scripts {
   /** @param {import("./teach.js").Teach} sheet */
   constructor(sheet) {
     this.#sheet = sheet;
-    this.open.addEventListener("change", () => this.#choose());
+    onConfirm(this.open, () => this.open.value && this.#choose());
     onChoice(this.#file, async ([file]) => sheet.load(await file.text(), file.name.replace(/\.ya?ml$/i, "")));
   }
 

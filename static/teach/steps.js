@@ -130,7 +130,7 @@ export class Steps {
   async #insert(step) {
     const own = (await this.#fresh()) ? this.#blocks[this.#opened] : null;
     const edit = inserted(this.#sheet.shownText ?? this.#sheet.emptyText, own ?? null, step);
-    this.#take(edit, `Insert: ${step.split("\n")[0]}.`);
+    this.#take(edit, `Inserted: ${step.split(":")[0]}.`);
     this.#buttons.add.focus();
   }
 

@@ -19,7 +19,7 @@ const ID = "teach"; // id of the requests
 const [WIDTH, HEIGHT] = [96, 72]; // px of a picture
 const RADIANS = Math.PI / 180;
 const EMPTY = "There is no pose yet. Move the arm and add a pose.";
-const TEACH = "Move the arm, then press Add pose. Each pose keeps the joints and the gripper. Or choose a program above.";
+const TEACH = "Move the arm, then press Add pose. Or choose a program above.";
 const NO_STEP = "There is no step yet. Insert the first one, or add poses.";
 const ERRORS = "The text has errors: see the lines below.";
 /** @typedef {"poses" | "steps" | "text"} View */
