@@ -189,6 +189,7 @@ def test_steps_are_edited_and_undone_and_the_text_follows(
     wait_text(sheet, SCRIPT.replace(grasp, grasp * 2))
     press(sheet, "Remove: grasp cup")
     wait_text(sheet, SCRIPT)
+    sheet.wait_until(lambda: names(sheet) == titles, "the steps")
     open_block(sheet, "home")
     press(sheet, "Insert after: home")
     sheet.keep(artefacts / "blocks-menu.png")
