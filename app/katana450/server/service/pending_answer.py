@@ -112,7 +112,7 @@ class PendingAnswer:
                 self.done = msgspec.structs.replace(await self._late, id=self.done.id)
             except KatanaError as error:
                 return answers.Refused(id=self.done.id, why=str(error))
-            # What came before the command is no end of its motion.
+            # Motions and stops from before the command do not end its motion.
             gate = self._hub.gate
             self._motions, self._revocations = gate.motions, gate.revocations
         ticket = self.done.ticket
