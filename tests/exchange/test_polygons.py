@@ -57,18 +57,6 @@ def test_a_hole_that_a_bridge_joins_stays_open() -> None:
     assert sizes.sum() == pytest.approx(12.0)
 
 
-def test_a_comb_is_covered_once() -> None:
-    teeth = 250
-    x = np.arange(2 * teeth) // 1.0
-    top = np.column_stack((x, np.where(np.arange(2 * teeth) % 2, 9.0, 1.0)))
-    bottom = np.column_stack((x, np.zeros(2 * teeth)))[::-1]
-    flat = np.concatenate((top, bottom))[::-1]
-    points = np.column_stack((flat, np.zeros(len(flat))))
-    sizes = areas(points, np.array((0.0, 0.0, 1.0)))
-    assert sizes.min() >= 0.0
-    assert sizes.sum() == pytest.approx(shoelace(flat))
-
-
 def test_a_polygon_that_crosses_itself_gives_as_many_triangles() -> None:
     bow = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 0], [0, 1, 0], [0.5, 3, 0]], dtype=float)
     assert len(areas(bow, np.array((0.0, 0.0, 1.0)))) == 3
