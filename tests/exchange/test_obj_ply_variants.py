@@ -61,10 +61,11 @@ def test_a_missing_or_broken_library_leaves_the_surface() -> None:
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig"])
-def test_byte_order_marks_of_obj(encoding: str) -> None:
+def test_byte_order_marks_and_ends_of_lines_of_obj(encoding: str) -> None:
     mark = "\ufeff" if encoding.endswith("e") else ""
-    shape = read_shape(f"{mark}{OBJ}".encode(encoding), Format.OBJ, "a.obj")
-    assert len(shape.faces) == 3
+    for text in (OBJ, OBJ.replace("\n", "\r"), OBJ.replace("\n", "\r\n")):
+        shape = read_shape(f"{mark}{text}".encode(encoding), Format.OBJ, "a.obj")
+        assert len(shape.faces) == 3
 
 
 @pytest.mark.parametrize(

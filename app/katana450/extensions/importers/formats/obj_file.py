@@ -86,7 +86,7 @@ LEFT_OUT = {
 def read_obj(data: bytes, name: str, companions: Companions | None = None) -> MeshReading:
     """Return all polygons. Raises InputError with the line of an invalid statement."""
     lines = _Lines(name, companions or Companions())
-    text = plain_text(data).replace("\r\n", "\n").replace("\\\n", " ")
+    text = plain_text(data).replace("\r\n", "\n").replace("\r", "\n").replace("\\\n", " ")
     for number, line in enumerate(text.split("\n"), 1):
         words = line.partition("#")[0].split()
         if words:

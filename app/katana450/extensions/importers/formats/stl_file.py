@@ -10,12 +10,7 @@ import re
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.importers.formats.surface import (
-    MeshReading,
-    check_triangles,
-    doubles,
-    of_polygons,
-)
+from katana450.extensions.importers.formats.surface import MeshReading, doubles, of_polygons
 
 HEADER = 84
 """[bytes] Size of the binary header: 80 bytes of any content, and the number of triangles."""
@@ -39,7 +34,6 @@ def read_stl(data: bytes, name: str) -> MeshReading:
     count = int.from_bytes(data[80:84], "little")
     # Some binary files begin with "solid" too, so the size decides.
     if len(data) >= HEADER and len(data) == HEADER + count * TRIANGLE.itemsize:
-        check_triangles(count, name)
         rows = np.frombuffer(data, TRIANGLE, count, HEADER)
         points = doubles(rows["corners"]).reshape(-1, 3)
         if rows["extra"].any():
@@ -70,7 +64,6 @@ def _corners(data: bytes, name: str) -> list[tuple[bytes, ...]]:
         match = _FACET.match(data, offset) if is_open else None
         if match is not None:
             corners.append(match.groups())
-            check_triangles(len(corners), name)
         else:
             match = _SOLID.match(data, offset)
             if match is None or bool(match[1]) != is_open:
