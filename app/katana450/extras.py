@@ -11,6 +11,7 @@ from typing import Any
 from katana450.errors import ConfigurationError
 
 PACKAGES = {
+    "cameras": "opencv-python-headless",
     "datasets": "pyarrow rosbags",
     "films": "imageio-ffmpeg",
     "gallery": "robot-descriptions",

@@ -76,6 +76,12 @@ EXTENSIONS = (
             ),
         ),
     ),
+    Extension(
+        "cameras",
+        serve_options=f"{HERE}.cameras.serve_parts:add_serve_options",
+        routes=f"{HERE}.cameras.serve_parts:routes",
+        process=f"{HERE}.cameras.serve_parts:process",
+    ),
     Extension("phone", routes=f"{HERE}.phone:phone_routes"),
     Extension(
         "recording",

@@ -1,0 +1,1 @@
+"""Cameras beside the scene, which show the real arm: their pictures and the ages of these."""
