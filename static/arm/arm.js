@@ -20,7 +20,7 @@ const FOLLOWS = ["holding", "moving"];
 /** @param {Acts} acts */
 const entriesOf = (acts) => /** @type {[Act, string][]} */ (Object.entries(acts));
 
-export class Arm {
+export class Card {
   #mode = "";
   #acts = "";
   #about = html("span", {});

@@ -5,6 +5,8 @@ const OPEN = "katana450.instruments.open";
 const WELCOMED = "katana450.welcome";
 const PAST = "katana450.timeline.open";
 export const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
+// Cards over the scene that only some servers have, by the field of the status that they show.
+const CARDS = { arm: () => import("../arm/arm.js"), cameras: () => import("../cameras/cameras.js") };
 
 export class Parts {
   #page;
@@ -22,8 +24,8 @@ export class Parts {
   panel = null;
   /** @type {import("../welcome/welcome.js").Welcome | null} */
   welcome = null;
-  /** @type {import("../arm/arm.js").Arm | null} */
-  #arm = null;
+  /** @type {Record<string, { draw(status: Page.Status): void }>} */
+  #cards = {};
   /** @type {Promise<import("../teach/teach.js").Teach> | null} */
   #teachLoads = null; // one sheet, also after two clicks
   /** @type {Promise<import("../welcome/welcome.js").Welcome> | null} */
@@ -35,7 +37,8 @@ export class Parts {
     this.#frame = frame;
     this.#watch = watch;
     page.store.follow((status) => this.#drawEpisodes(status));
-    page.store.follow((status) => this.#drawArm(status));
+    page.store.follow((status) => this.#drawCard("arm", status));
+    page.store.follow((status) => this.#drawCard("cameras", status));
     onClick("timeline-button", () => {
       element("more", HTMLDialogElement).close();
       this.showTimeline(true, !this.timeline?.open);
@@ -84,12 +87,12 @@ export class Parts {
     this.episodes.draw(this.#page.store.status ?? status);
   }
 
-  /** The real arm, when a driver reports on it. @param {Page.Status} status */
-  async #drawArm(status) {
-    if (!this.#arm && !status.arm) return;
-    const { Arm } = await import("../arm/arm.js");
-    this.#arm ??= new Arm(this.#page.stage, this.#page);
-    this.#arm.draw(this.#page.store.status ?? status);
+  /** A card, when the status has its field. @param {keyof typeof CARDS} name @param {Page.Status} status */
+  async #drawCard(name, status) {
+    if (!this.#cards[name] && !status[name]) return;
+    const { Card } = await CARDS[name]();
+    this.#cards[name] ??= new Card(this.#page.stage, this.#page);
+    this.#cards[name].draw(this.#page.store.status ?? status);
   }
 
   /** Show the line of what was recorded, `open` with its controls, or fold it away. @param {boolean} shown @param {boolean} open */

@@ -37,6 +37,8 @@ declare namespace Page {
     undo?: string[]; redo?: string[];
     clearance: Clearance | null;
     cautions?: string; episodes?: EpisodesState | null; robot?: Robot | null;
+    /** Names of the cameras. */
+    cameras?: string[];
   }
 
   /** The two nearest parts: their distance [mm], and the nearest point of each in m of viser's world. */

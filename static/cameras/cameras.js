@@ -1,0 +1,91 @@
+// Pictures of cameras over the scene, with their age. Loaded when the server has cameras.
+import { styled, t, write } from "../dom.js";
+import { html } from "../instruments/shape.js";
+
+const OLD = 300; // ms, age from which a picture is grey
+const LOOK = 100; // ms between two looks at the ages
+const AGAIN = 1000; // ms before the next attempt to connect
+const AGE_BYTES = 8; // before the JPEG file of a message, the age when it was sent: a float64 [s]
+
+class Camera {
+  #canvas = html("canvas", { role: "img", "aria-label": "Picture of the camera" });
+  #says = html("p", { role: "status" });
+  #age = html("span", {});
+  /** @type {WebSocket | null} */
+  #socket = null;
+  #made = -Infinity; // time of the picture that is shown
+
+  /** @param {string} name @param {Page.Context} page */
+  constructor(name, page) {
+    this.page = page;
+    this.name = name;
+    this.view = html("details", { open: "", "aria-label": `${t("Camera")} ${name}` }, html("summary", {}, name, this.#age), this.#canvas, this.#says);
+    this.view.addEventListener("toggle", () => (this.view.open ? this.#connect() : this.#socket?.close()));
+    setInterval(() => this.#look(), LOOK);
+  }
+
+  #connect() {
+    if (!this.view.open || !this.view.isConnected || this.#socket) return;
+    const socket = new WebSocket(new URL(`api/v1/cameras/${this.name}`, location.href.replace(/^http/, "ws")));
+    socket.binaryType = "arraybuffer";
+    this.#socket = socket;
+    // As often as the page is drawn: a hidden one asks for nothing.
+    const ask = () => requestAnimationFrame(() => socket.readyState === WebSocket.OPEN && socket.send(""));
+    socket.onopen = ask;
+    socket.onmessage = async ({ data }) => {
+      if (typeof data === "string") {
+        this.#made = -Infinity;
+        write(this.#says, data);
+      } else await this.#show(data);
+      ask();
+    };
+    socket.onclose = ({ reason }) => {
+      this.#socket = null;
+      this.#made = -Infinity;
+      if (reason) write(this.#says, reason);
+      setTimeout(() => this.#connect(), AGAIN);
+    };
+  }
+
+  /** @param {ArrayBuffer} data */
+  async #show(data) {
+    // Half the round trip is the way of the picture from the server.
+    const age = 1000 * new DataView(data).getFloat64(0, true) + (this.page.store.trip ?? 0) / 2;
+    const made = performance.now() - age;
+    const picture = await createImageBitmap(new Blob([data.slice(AGE_BYTES)], { type: "image/jpeg" })).catch(() => null);
+    if (!picture) return write(this.#says, "A picture of this camera cannot be read.");
+    [this.#canvas.width, this.#canvas.height] = [picture.width, picture.height];
+    this.#canvas.getContext("2d")?.drawImage(picture, 0, 0);
+    picture.close();
+    this.#made = made;
+    this.#look();
+  }
+
+  #look() {
+    const age = performance.now() - this.#made;
+    const isOld = age > OLD;
+    this.view.dataset.old = String(isOld);
+    this.#canvas.hidden = age === Infinity;
+    write(this.#age, age === Infinity ? "" : isOld ? `${(age / 1000).toFixed(1)} s` : `${Math.round(age)} ms`);
+    if (age < Infinity) write(this.#says, isOld ? "This picture is old. Do not drive by it." : "");
+  }
+}
+
+export class Card {
+  #cards = html("div", { id: "cameras" });
+  #page;
+  #shown = "";
+
+  /** @param {HTMLElement} stage @param {Page.Context} page */
+  constructor(stage, page) {
+    this.#page = page;
+    styled("cameras.css", import.meta.url);
+    stage.append(this.#cards);
+  }
+
+  /** Show the cameras of a status. @param {Page.Status} status */
+  draw({ cameras = [] }) {
+    if (this.#shown === (this.#shown = cameras.join())) return;
+    this.#cards.replaceChildren(...cameras.map((name) => new Camera(name, this.#page).view));
+  }
+}
