@@ -91,7 +91,10 @@ OPENAPI_VALIDATOR = Package(
 ROSLIBPY = Package("roslibpy==2.1.0", "roslibpy/__init__.py", alone=False)
 """The client of rosbridge for Python; with Twisted, which nothing else needs."""
 
-WHEELS = (OPENAPI_VALIDATOR, ROSLIBPY)
+OPENCV = Package("opencv-python-headless==4.11.0.86", "cv2/__init__.py")
+"""What reads cameras that send no MJPEG."""
+
+WHEELS = (OPENAPI_VALIDATOR, ROSLIBPY, OPENCV)
 """Packages of PyPI."""
 
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")

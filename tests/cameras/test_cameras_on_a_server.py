@@ -1,0 +1,101 @@
+"""Cameras of a real server: their pictures with their ages, and the arm without them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
+
+import katana450
+from katana450.arm.control.lease import Role
+from katana450.extensions.cameras.camera_link import AGE
+from katana450.server.web.access_links import AccessFile
+from tests.browser.server import APP, AppServer
+from tests.cameras.mjpeg_camera import MjpegCamera
+from tests.gateway.test_access import give
+from tests.waiting import until
+
+
+@pytest.fixture(scope="module")
+def camera() -> Iterator[MjpegCamera]:
+    with MjpegCamera() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def server(camera: MjpegCamera) -> Iterator[AppServer]:
+    with AppServer(
+        (*APP, f"--camera=table={camera.url}", "--camera=away=http://127.0.0.1:9/")
+    ) as it:
+        yield it
+
+
+@contextmanager
+def opened(server: AppServer, name: str, query: str = "") -> Iterator[Connection]:
+    with connect(f"{server.url.replace('http', 'ws')}/api/v1/cameras/{name}{query}") as socket:
+        yield socket
+
+
+def asked(socket: Connection) -> tuple[float, bytes] | str:
+    """Ask for the next picture; return its age [s] and its file, or why there is none."""
+    socket.send("")
+    message = socket.recv(10.0)
+    if isinstance(message, str):
+        return message
+    return AGE.unpack_from(message)[0], message[AGE.size :]
+
+
+def wait_for_picture(socket: Connection) -> None:
+    until(lambda: not isinstance(asked(socket), str))
+
+
+def test_pictures_are_new_and_a_slow_page_gets_fewer(server: AppServer) -> None:
+    with opened(server, "table") as socket:
+        wait_for_picture(socket)
+        got = [asked(socket) for _ in range(30)]
+        assert len({part[1] for part in got if isinstance(part, tuple)}) == 30
+        # None waits for a page that does not ask.
+        time.sleep(0.2)
+        answer = asked(socket)
+        assert isinstance(answer, tuple)
+        assert 0.0 <= answer[0] < 0.15
+
+
+def test_camera_that_cannot_be_reached_says_why(server: AppServer) -> None:
+    with opened(server, "away") as socket:
+        until(lambda: "cannot be reached: Connection refused" in str(asked(socket)))
+    with opened(server, "none") as socket, pytest.raises(ConnectionClosed, match="no camera none"):
+        asked(socket)
+
+
+def test_arm_is_driven_while_the_process_of_the_cameras_is_away(server: AppServer) -> None:
+    with opened(server, "table") as socket:
+        wait_for_picture(socket)
+        os.kill(server.child("katana450 cam"), signal.SIGKILL)
+        with katana450.connect(server.url, name="Ada") as arm:
+            arm.nudge(1, 0.1)
+        wait_for_picture(socket)
+
+
+@pytest.mark.long
+def test_viewers_see_no_camera_that_is_for_drivers(camera: MjpegCamera, tmp_path: Path) -> None:
+    file = AccessFile.create(tmp_path / "access.json")
+    tokens = {role: give(file, role) for role in (Role.VIEWER, Role.OPERATOR)}
+    options = f"--camera=table={camera.url}", "--cameras-for=drivers", f"--access={file.path}"
+    with AppServer((*APP, *options)) as server:
+        with opened(server, "table", f"?token={tokens[Role.OPERATOR]}") as socket:
+            wait_for_picture(socket)
+        for query, why in ((f"?token={tokens[Role.VIEWER]}", "who may drive"), ("", "token")):
+            with (
+                opened(server, "table", query) as socket,
+                pytest.raises(ConnectionClosed, match=why),
+            ):
+                asked(socket)
