@@ -5,7 +5,8 @@
 A program swings the arm all the time. The turns are: no other clients; 32 watchers that acknowledge
 pictures 30 times a second; senders that flood the server; readers that read nothing; senders of
 messages that no page can send; silent connections; thirty programs of one person that together ask
-for the branches twelve thousand times a second. Each turn prints how late the control loop's ticks
+for the branches twelve thousand times a second. Another server then has three cameras: nobody looks
+at them, and two pages show each. Each turn prints how late the control loop's ticks
 were (the server's own count) and how long a STOP takes: until the first tick known to brake, which
 includes the path to the server, and until the sender knows it. Both processes read one clock. A
 lost connection is printed, and the next turn follows.
@@ -20,7 +21,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Awaitable, Callable
-from contextlib import AsyncExitStack, suppress
+from contextlib import AsyncExitStack, ExitStack, suppress
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -30,9 +33,11 @@ from websockets.exceptions import WebSocketException
 from katana450.arm.runtime.pipes.state_publisher import TIMED_TICKS
 from katana450.client import AsyncClient, aconnect
 from katana450.errors import KatanaError
+from katana450.extensions.cameras.camera_link import AGE
 from katana450.server.api import answers, requests
 from katana450.server.service.budget import IDENTITY_BUDGET, MAX_DEBT
-from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.browser.server import ATTENTIVE_APP, AppServer, free_port
+from tests.cameras.mjpeg_camera import stamp_of
 from tests.gateway.client import SUBPROTOCOL, Peer, enter, page_name, websocket
 
 WATCHERS = 32
@@ -49,6 +54,9 @@ ASKING, ASKED = 30, 390.0
 
 RECOVERY = MAX_DEBT / IDENTITY_BUDGET + 1.0
 """[s] Pause between two turns."""
+
+CAMERAS, PAGES = ("table", "side", "hand"), 2
+"""Names of the cameras, 640x480 px 30 times a second, and number of pages that show each."""
 
 TURN_SECONDS = 120.0
 """[s] Timeout of a turn."""
@@ -168,6 +176,43 @@ async def inquire(url: str) -> None:
                     await asyncio.sleep(max(due - time.monotonic(), 0.0))
 
 
+@dataclass
+class Shown:
+    """The pictures that pages got: their number, those left out, and their times.
+
+    Attributes:
+        count: number of pictures.
+        dropped: number of pictures of the camera between two that came.
+        delays: [s] from the sending of the camera to the page.
+        errors: [s] differences between the times that page and camera name for a picture.
+    """
+
+    count: int = 0
+    dropped: int = 0
+    delays: list[float] = field(default_factory=list)
+    errors: list[float] = field(default_factory=list)
+
+
+async def look(url: str, camera: str, shown: Shown) -> None:
+    """Ask for each picture of ``camera``, as a page does, until cancelled."""
+    before = None
+    async with websocket(url, f"/api/v1/cameras/{camera}", enter(url)) as socket:
+        while True:
+            await socket.send("")
+            message = await socket.recv()
+            if isinstance(message, str):
+                await asyncio.sleep(0.1)
+                continue
+            came, (age,) = time.perf_counter(), AGE.unpack_from(message)
+            number, sent = stamp_of(message[AGE.size :])
+            if before is not None:
+                shown.count += 1
+                shown.dropped += number - before - 1
+                shown.delays.append(came - sent)
+                shown.errors.append(came - age - sent)
+            before = number
+
+
 async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
     """Return [s] from STOP until a tick brakes, and until a state shows it, each time.
 
@@ -248,22 +293,53 @@ async def crowd(url: str, stops: int) -> None:
     await turn(url, f"{ASKING} querying clients", [lambda: inquire(url)] * ASKING, stops)
 
 
+async def cameras(url: str, stops: int) -> None:
+    """Run the turns with cameras."""
+    shown = Shown()
+    await turn(url, "cameras, none shown", [], stops)
+    looks = [partial(look, url, name, shown) for name in CAMERAS for _ in range(PAGES)]
+    await turn(url, f"cameras, {PAGES} pages each", [*looks], stops)
+    delay, error = (1e3 * np.percentile(values, 99) for values in (shown.delays, shown.errors))
+    print(
+        f"{'':20} {shown.count} pictures, {100 * shown.dropped / shown.count:.2f} % left out, "
+        f"delay p99 {delay:.1f} ms, error of their time p99 {error:.1f} ms"
+    )
+
+
 def main() -> None:
     """Start a server, run all turns, print."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
     parser.add_argument("--stops", type=int, default=40, help="of each turn (default: 40)")
     parser.add_argument("--url", help=argparse.SUPPRESS)
+    parser.add_argument("--with-cameras", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.url is not None:
-        asyncio.run(crowd(options.url, options.stops))
+        turns = cameras if options.with_cameras else crowd
+        asyncio.run(turns(options.url, options.stops))
         return
     with AppServer(ATTENTIVE_APP) as server:
-        root = Path(__file__).resolve().parents[1]
-        # The clients run in a separate process, so that they do not slow the server's threads.
-        command = [sys.executable, "-m", "benchmarks.load", "--url", server.url]
-        stops = ("--stops", str(options.stops))
-        # One turn more than there are, for time outside the turns.
-        subprocess.run([*command, *stops], cwd=root, check=True, timeout=8.0 * TURN_SECONDS)
+        _run_turns(server, options.stops)
+    with ExitStack() as stack:
+        sources = []
+        for name in CAMERAS:
+            port = free_port()
+            command = [sys.executable, "-m", "tests.cameras.mjpeg_camera", str(port)]
+            camera = stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE))
+            stack.callback(camera.kill)
+            assert camera.stdout is not None
+            sources.append(f"--camera={name}={camera.stdout.readline().decode().strip()}")
+        server = stack.enter_context(AppServer((*ATTENTIVE_APP, *sources)))
+        _run_turns(server, options.stops, "--with-cameras")
+
+
+def _run_turns(server: AppServer, stops: int, *options: str) -> None:
+    # The clients run in a separate process, so that they do not slow the server's threads.
+    command = [sys.executable, "-m", "benchmarks.load", "--url", server.url, *options]
+    root = Path(__file__).resolve().parents[1]
+    # One turn more than there are, for time outside the turns.
+    subprocess.run(
+        [*command, "--stops", str(stops)], cwd=root, check=True, timeout=8.0 * TURN_SECONDS
+    )
 
 
 if __name__ == "__main__":
