@@ -22,9 +22,17 @@ from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import near_turns
 from katana450.maths.motion.limiter import JointMotion
 from tests.conftest import LONG, MANY_DRAGS
-from tests.general_arms.published_arms import FOUR, NEAR_MISS, OFFSET, SEVEN, SIX, SKEWED
+from tests.general_arms.published_arms import (
+    FOUR,
+    NEAR_MISS,
+    OFFSET,
+    SEVEN,
+    SIX,
+    SKEWED,
+    XARM_7,
+)
 
-ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED, **OFFSET, **NEAR_MISS}
+ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED, **OFFSET, **NEAR_MISS, "xArm 7": XARM_7}
 DRAGS_OF_A_TRIP = 10
 MAX_CALLS = 400
 """Number of ticks of a drag after which it must have ended if its way is clear."""
