@@ -105,6 +105,7 @@ INVALID: dict[Format, list[tuple[bytes | str, str]]] = {
         (ply().replace(b"format ascii 1.0\n", b""), "has no format"),
         (ply().replace(b"float z", b"float w"), "no vertices with x, y and z"),
         (ply(faces=0), "has no triangles"),
+        (ply().replace(b"nt face", b"nt tristrips"), r"no triangles\. It has 1 tristrips"),
         (ply(vertices=2**31), "ends too early"),
         (ply("3 0 1 3\n"), "vertex 3, counted from 0, but only 3 vertices"),
         (ply("3 0 1 -1\n"), "vertex -1"),

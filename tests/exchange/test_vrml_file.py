@@ -115,17 +115,6 @@ def test_clockwise_faces_are_turned_over() -> None:
         assert np.cross(b - a, c - a)[2] * side > 0.0
 
 
-def test_concave_faces_are_covered_once() -> None:
-    shape = shown(
-        "IndexedFaceSet { convex FALSE coordIndex [ 0 1 2 3 -1 ] "
-        "coord Coordinate { point [ 0 0 0, 2 1 0, 0 2 0, 1 1 0 ] } }"
-    )
-    a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
-    twice = np.cross(b - a, c - a)[:, 2]
-    assert (twice > 0.0).all()
-    assert twice.sum() / 2.0 * 100.0 == pytest.approx(1.0)
-
-
 def test_transforms_follow_the_standard() -> None:
     """Compute P' = T C R SR S -SR -C P factor by factor."""
     shape = world(

@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import trimesh
 from starlette.exceptions import HTTPException
@@ -25,7 +26,6 @@ from katana450.server.web.access_links import AccessFile
 from katana450.server.web.bodies import BODY_SECONDS, body_of
 from tests.browser.server import AppServer
 from tests.exchange.shape_bytes import zipped
-from tests.exchange.test_reading_time import star
 from tests.exchange.test_several_files import PARTS
 from tests.gateway.client import HOUR, ask
 from tests.gateway.site import open_site
@@ -49,14 +49,24 @@ def head(server: AppServer, token: str, path: str, length: int) -> bytes:
     ).encode()
 
 
+def star(count: int) -> bytes:
+    """Return an OBJ file of one polygon, every second corner of which is concave."""
+    angle = np.arange(count) * (2.0 * np.pi / count)
+    radius = np.where(np.arange(count) % 2, 100.0, 60.0)
+    rows = [
+        f"v {r * np.cos(a):.6f} {r * np.sin(a):.6f} 0" for r, a in zip(radius, angle, strict=True)
+    ]
+    return "\n".join((*rows, "f " + " ".join(map(str, range(1, count + 1))))).encode()
+
+
 def slow_scene() -> bytes:
-    """Return a scene of files within the limits, each of which takes too long to read."""
+    """Return a scene of files within the limits, each of which takes some seconds to read."""
     names = [f"star{number}.obj" for number in range(SLOW_MESHES)]
     rows = [
         f"  - {{name: s{number}, shape: mesh, mesh: {{file: {name}}}, pose: [0, 0, 0, 0, 0, 0]}}"
         for number, name in enumerate(names)
     ]
-    packed, content = io.BytesIO(), star(50_000)
+    packed, content = io.BytesIO(), star(64_000)
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("scene.yaml", "\n".join(("scene: 1", "objects:", *rows)))
         for name in names:
