@@ -6,6 +6,7 @@ import os
 import select
 import signal
 import socket
+import sys
 import threading
 import time
 from abc import abstractmethod
@@ -69,9 +70,11 @@ class DeviceServer(Generic[ArmT]):
         self._listening.setblocking(False)
         self.port: int = self._listening.getsockname()[1]
         self._client: socket.socket | None = None
-        self._ends = os.openpty() if self.has_terminal and hasattr(os, "openpty") else ()
-        self.terminal = os.ttyname(self._ends[1]) if self._ends else ""
-        if self._ends:
+        self._ends: tuple[int, ...] = ()
+        self.terminal = ""
+        if sys.platform != "win32" and self.has_terminal:
+            self._ends = os.openpty()
+            self.terminal = os.ttyname(self._ends[1])
             # A program that reads nothing loses replies, and does not hold the arm up.
             os.set_blocking(self._ends[0], False)
         self._ending = threading.Event()
@@ -112,7 +115,8 @@ class DeviceServer(Generic[ArmT]):
     def _turn(self) -> None:
         client = self._client
         waited = self._listening if client is None else client
-        readable, _, _ = select.select([waited, *self._ends[:1]], [], [], IDLE)
+        waiting: list[socket.socket | int] = [waited, *self._ends[:1]]
+        readable, _, _ = select.select(waiting, [], [], IDLE)
         with self.lock:
             self._advance()
             if self._ends and self._ends[0] in readable:
