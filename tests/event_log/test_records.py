@@ -201,7 +201,7 @@ def test_lease_of_a_driver_who_left_is_recorded_as_free(closed: bool) -> None:
     hub = Hub(lambda: 1.0)
     people = [Identity(name, name, Role.ADMIN) for name in ("Bert", "Anna")]
     bert, anna = (hub.join(person, "page", lambda _: None) for person in people)
-    hub.acquire(bert)
+    hub.gate.acquire(bert.actor)
     if closed:
         hub.close(people[0], "page")
     hub.recorder.enabled = True

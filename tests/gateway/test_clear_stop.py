@@ -211,7 +211,7 @@ def test_clear_stop_is_offered_with_the_reason_to_wait(table: ClearingTable) -> 
     table.hub.release_lease(driver)
     assert status.of(table.hub, driver)["may_clear_stop"]
     assert not status.of(table.hub, viewer)["may_clear_stop"]
-    table.hub.acquire(driver)
+    table.hub.gate.acquire(driver.actor)
     with pytest.raises(LeaseError, match=r"Clear the stop in 0\.6 s"):
         table.hub.move(driver, cmd.ClearStop())
     assert table.hub.stopped is not None

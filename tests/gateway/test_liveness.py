@@ -378,7 +378,7 @@ def test_closed_window_brakes_and_frees_the_arm(
     revocations = simulated.hub.gate.revocations
     other = simulated.join(PAGES[1], Role.OPERATOR)
     simulated.wait(SETTLE_TIME + TICK)
-    simulated.hub.acquire(other)
+    simulated.hub.gate.acquire(other.actor)
     assert simulated.hub.lease.driver == other.person
     # What the page before had begun is void.
     assert simulated.hub.gate.revocations > revocations

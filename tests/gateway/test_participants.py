@@ -45,7 +45,7 @@ def test_new_name_is_seen_everywhere_and_the_driver_keeps_the_arm(table: Table) 
     assert status.common(table.hub)["holder"] == "Anna B."
     assert status.of(table.hub, driver)["mine"]
     assert (table.arm.holds, table.hub.gate.revocations) == (holds, revocations)
-    table.hub.request(other)
+    table.hub.gate.change(lambda lease, _: lease.request(other.person), other.actor)
     table.hub.rename(other, "Ben")
     assert [person["name"] for person in status.of(table.hub, driver)["asking"]] == ["Ben"]
     table.hub.move(driver, cmd.Pause())

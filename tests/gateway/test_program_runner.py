@@ -165,7 +165,7 @@ def test_stop_that_another_person_clears_leaves_the_lease_to_the_owner(table: St
     # Without an interrupted program the lease is for the person who clears the stop.
     table.stop("Somebody")
     table.wait(0.1, owner)
-    table.hub.acquire(other)
+    table.hub.gate.acquire(other.actor)
     table.hub.release_lease(other)
     table.hub.move(other, cmd.ClearStop())
     assert table.hub.lease.holder == other.person

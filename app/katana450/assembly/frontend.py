@@ -66,7 +66,7 @@ def serve(
 
     def notify(why: str) -> None:
         web.recorder.note("restart", SERVER, why=why)
-        gateway.announce(why)
+        gateway.soon(gateway.hub.announce, why)
 
     supervisor.notify = notify
     try:
@@ -138,7 +138,7 @@ def _attach(gateway: Gateway, machine: DescribedRobot, pipe: FrontEnd) -> None:
     planning_worker = None
     if robot.arm is not None:
         planning_worker = PlanningWorker(session, pipe.state_publisher, pipe)
-        planning_worker.notify = gateway.announce
+        planning_worker.notify = partial(gateway.soon, gateway.hub.announce)
         planning_worker.redirected = guarded(gateway.hub.runner.redirected)
     pipe.start()
     gateway.attach(ArmHandle(robot, session, pipe, planning_worker, nodes))

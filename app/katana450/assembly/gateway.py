@@ -129,10 +129,6 @@ class Gateway:
 
         self.soon(attach)
 
-    def announce(self, why: str) -> None:
-        """Notify all clients why a request is not executed. Can be called in any thread."""
-        self.soon(self.hub.announce, why)
-
     def soon(self, act: Callable[..., None], *arguments: Any) -> None:
         """Run ``act`` in the server's thread, and return at once. Can be called in any thread."""
         # RuntimeError: the server has ended.

@@ -133,16 +133,16 @@ class Dispatcher:
 
     def _change_lease(self, participant: Participant, request: Request) -> None:
         """Execute a request about the lease."""
-        hub = self._hub
+        hub, person, actor = self._hub, participant.person, participant.actor
         match request:
             case requests.Acquire():
-                hub.acquire(participant)
+                hub.gate.acquire(actor)
             case requests.Take():
                 hub.take(participant)
             case requests.Ask():
-                hub.request(participant)
+                hub.gate.change(lambda lease, _: lease.request(person), actor)
             case requests.Withdraw():
-                hub.withdraw(participant)
+                hub.gate.change(lambda lease, _: lease.withdraw(person), actor)
             case requests.ReleaseLease():
                 hub.release_lease(participant)
             case requests.Give(to=number):

@@ -265,24 +265,10 @@ class Hub:
         owner = (program.owner,) if program is not None and program.person == holder else ()
         return tuple(session_of(key) for key in (holder.key, *owner))
 
-    def acquire(self, participant: Participant) -> None:
-        """Acquire the free lease for ``participant``. Raises LeaseError if another holds it."""
-        self.gate.acquire(participant.actor)
-
     def take(self, participant: Participant) -> None:
         """Take the lease from its holder for ``participant``. Raises LeaseError if not allowed."""
         person, act = participant.person, "taken" if self.lease.driver else "acquired"
         self.gate.change(lambda lease, t: lease.take(person, t), participant.actor, act)
-
-    def request(self, participant: Participant) -> None:
-        """Request the lease from its holder for ``participant``. Raises LeaseError."""
-        person = participant.person
-        self.gate.change(lambda lease, _: lease.request(person), participant.actor)
-
-    def withdraw(self, participant: Participant) -> None:
-        """Withdraw the request of ``participant`` for the lease."""
-        person = participant.person
-        self.gate.change(lambda lease, _: lease.withdraw(person), participant.actor)
 
     def release_lease(self, participant: Participant) -> None:
         """Release the lease of ``participant``. Raises LeaseError if another holds it."""

@@ -143,7 +143,7 @@ class ProgramParticipant:
                 # A handover in one step: no other participant can take the lease in between.
                 hub.hand_over(owner, joined.number)
             else:
-                hub.acquire(joined)
+                hub.gate.acquire(joined.actor)
             # Drops earlier targets; a pause lasts. Raises LeaseError if the arm is stopped.
             self.ticket = hub.move(joined, cmd.Hold())
         except LeaseError:
