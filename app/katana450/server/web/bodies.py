@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
+from typing import Any
 
+import msgspec
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
@@ -47,13 +49,11 @@ async def body_of(
     return bytes(body)
 
 
-def as_json(
-    answer: answers.Answer, status: int = 200, headers: Mapping[str, str] | None = None
-) -> Response:
-    """Return ``answer`` as an HTTP response."""
+def as_json(answer: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
+    """Return ``answer``, one of the API or other values of JSON, as an HTTP response."""
     if isinstance(answer, answers.Refused):
         answer = answer.with_status(status)
-    return Response(answers.encoded(answer), status, headers, media_type="application/json")
+    return Response(msgspec.json.encode(answer), status, headers, media_type="application/json")
 
 
 def status_of(error: Exception) -> int:

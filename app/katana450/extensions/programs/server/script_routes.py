@@ -27,7 +27,7 @@ from katana450.extensions.programs.script.teach import DIGITS, taught
 from katana450.server.api.fields import ROOT
 from katana450.server.service.limits import BoundedWork
 from katana450.server.service.participants import actor_of
-from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, body_of
+from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, as_json, body_of
 from katana450.server.web.http_api import RouteContext
 
 MAX_WAITING = 8
@@ -61,7 +61,7 @@ class ScriptRoutes:
         names = await asyncio.to_thread(self._scripts.offered, model)
         fingers = arm is None or (model or arm.robot.joint_group).gripper.moves
         steps = examples(fingers=fingers)
-        return _json({"names": names, "saves": self._scripts.keeps, "steps": steps})
+        return as_json({"names": names, "saves": self._scripts.keeps, "steps": steps})
 
     async def _schema(self, _request: Request) -> Response:
         """Return the JSON Schema of scripts, which holds nothing of this server."""
@@ -102,7 +102,7 @@ class ScriptRoutes:
                 answer["problems"] = tuple(_beyond(blocks, axes))
             except ScriptError as error:
                 answer["problems"] = error.problems
-            return _json(answer)
+            return as_json(answer)
 
         return await self._with_text(request, reading)
 
@@ -166,7 +166,3 @@ def _beyond(blocks: Iterable[TextBlock], axes: Mapping[str, Sequence[float]]) ->
 @cache
 def _schema_json() -> bytes:
     return msgspec.json.encode(script_schema())
-
-
-def _json(content: Any) -> Response:
-    return Response(msgspec.json.encode(content), media_type="application/json")

@@ -8,7 +8,6 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-import msgspec
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
@@ -31,7 +30,7 @@ from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import actor_of, key_of
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.web.admission import client_of
-from katana450.server.web.bodies import NOT_NOW, TOO_LONG, TOO_MANY, TOO_SLOW
+from katana450.server.web.bodies import NOT_NOW, TOO_LONG, TOO_MANY, TOO_SLOW, as_json
 from katana450.server.web.http_api import RouteContext
 
 UPLOAD_TIMEOUT = 120.0
@@ -76,7 +75,7 @@ class PlaybackRoutes:
 
         def read() -> Response:
             run.update()
-            return _json({"spans": run.spans, "marks": run.marks()})
+            return as_json({"spans": run.spans, "marks": run.marks()})
 
         return await self._store.work.result(read)
 
@@ -98,7 +97,7 @@ class PlaybackRoutes:
                 raise InputError("Nothing is recorded yet: the arm has not moved.")
             windows.show(key, shown)
             moments = [_moment_content(moment) for moment in shown]
-            return _json({"moments": moments, "moving": windows.moving})
+            return as_json({"moments": moments, "moving": windows.moving})
 
         return await self._store.work.result(show)
 
@@ -141,7 +140,7 @@ class PlaybackRoutes:
                 raise
             other = await asyncio.to_thread(self._store.is_of_another_robot, run)
             name, start = self._store.add(path, run), run.spans[0].start
-            return _json({"name": name, "start": start, "note": OTHER if other else ""})
+            return as_json({"name": name, "start": start, "note": OTHER if other else ""})
 
     def _run(self, request: Request, name: str) -> AnyRun:
         """Return the recording ``name`` for the sender of ``request``. Raises HTTPException."""
@@ -225,7 +224,3 @@ def _number(text: str | None) -> float:
     if not math.isfinite(value):
         raise HTTPException(HTTPStatus.BAD_REQUEST, "`t` and `t2` are seconds since the epoch.")
     return value
-
-
-def _json(content: Any) -> Response:
-    return Response(msgspec.json.encode(content), media_type="application/json")
