@@ -43,7 +43,7 @@ def test_video_has_the_episodes_one_after_another(tmp_path: Path) -> None:
             pictures.append(picture)
         row, _ = video.end_episode()
         rows.append({name.rpartition("/")[2]: value for name, value in row.items()})
-    video.finish()
+    video.encoder.finish()
     place = {"chunk_index": 0, "file_index": 0}
     assert rows == [
         {**place, "from_timestamp": 0.0, "to_timestamp": 0.4},

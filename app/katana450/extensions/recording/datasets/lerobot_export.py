@@ -65,7 +65,8 @@ class EpisodeVideo:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Pictures that refer to later ones would not begin at time 0.
         options = ("-crf", str(CRF), "-g", str(KEY_PICTURES), "-bf", "0")
-        self._encoder = VideoEncoder(path, size, fps, *options)
+        self.encoder = VideoEncoder(path, size, fps, *options)
+        """The film, which must be finished or abandoned."""
         self._written = self._begin = 0
         self.counts = PixelCounts()
         """Pixels of all episodes that have ended."""
@@ -73,7 +74,7 @@ class EpisodeVideo:
 
     def add(self, picture: npt.NDArray[np.uint8]) -> None:
         """Add the next ``picture`` (height, width, 3) of the present episode."""
-        self._encoder.add(picture)
+        self.encoder.add(picture)
         self._episode.add(picture)
         self._written += 1
 
@@ -89,14 +90,6 @@ class EpisodeVideo:
         self.counts.merge(self._episode)
         self._episode, self._begin = PixelCounts(), self._written
         return row, statistics
-
-    def finish(self) -> None:
-        """Complete the film. Raises OSError if that fails, as on a full disk."""
-        self._encoder.finish()
-
-    def abandon(self) -> None:
-        """End the encoder, whatever it has written."""
-        self._encoder.abandon()
 
 
 DEFAULT_OUTCOMES = tuple(outcome.value for outcome in JUDGED)
@@ -315,7 +308,7 @@ def export_lerobot(
         videos: list[EpisodeVideo] = []
         for feature in shape.videos.values():
             videos.append(EpisodeVideo(folder, feature, options.size, options.fps))
-            stack.callback(videos[-1].abandon)
+            stack.callback(videos[-1].encoder.abandon)
         episodes: Iterator[_Episode] = (_sampled_episode(cut, options.fps) for cut in cuts)
         pictures: Iterator[tuple[Pixels, ...]] = repeat(())
         if cameras is None or session is None:
@@ -338,7 +331,7 @@ def export_lerobot(
         # The last step of the progress.
         next(pictures, None)
         for video in videos:
-            video.finish()
+            video.encoder.finish()
         whole = [video.counts.statistics for video in videos]
         writer.finish(dict(zip(shape.videos.values(), whole, strict=True)))
     successes, unjudged = (sum(cut.success is value for cut in cuts) for value in (True, None))
