@@ -55,7 +55,7 @@ class PiecewisePolynomial:
             pieces = np.maximum(np.searchsorted(self._starts, t.c0, side="right") - 1, 0)
             local = t - np.array(self._starts)[pieces]
             terms = self._terms[pieces].transpose(2, 1, 0)
-        return tuple(_polynomial(row, local) for row in terms)
+        return tuple(polynomial(row, local) for row in terms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ class Polyline(PiecewisePolynomial):
         object.__setattr__(self, "_total", station)
 
 
-def _polynomial(terms: list[float] | FloatArray, t: Jet) -> Jet:
+def polynomial(terms: list[float] | FloatArray, t: Jet) -> Jet:
     """Return the polynomial of `terms`, the lowest power first, at `t` by Horner's rule."""
     b0, b1, b2, b3 = t.c0, t.c1, t.c2, t.c3
     a0, a1, a2, a3 = terms[-1], 0.0, 0.0, 0.0

@@ -9,7 +9,7 @@ those with axis 1 at zero, as in `ToolTarget`. Lengths in m, angles in rad, fram
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, product
 from typing import ClassVar, Final, Protocol
@@ -25,7 +25,7 @@ from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet, sin_cos, sqrt
-from katana450.maths.planning.polyline import Polyline
+from katana450.maths.planning.polyline import Polyline, polynomial
 from katana450.maths.planning.posture import ThreeJets, ToolJets, posture
 
 TURN_LENGTH = 0.25
@@ -262,13 +262,12 @@ class ToolTurn(_OneFormula):
 
     def at(self, sigma: Jet) -> ToolJets:
         """Return the tool at `sigma`, one place or many."""
-        position = self.target.position.tolist()
-        if self.offsets is None:
-            x, y, z = (place + 0.0 * sigma for place in position)
-        else:
-            ways = zip(position, self.offsets.T.tolist(), strict=True)
-            x, y, z = (place + _polynomial(coefficients, sigma) for place, coefficients in ways)
-        roll = _polynomial(self.rolls.tolist(), sigma)
+        s, zero = 2.0 * sigma - 1.0, 0.0 * sigma
+        x, y, z = (place + zero for place in self.target.position.tolist())
+        if self.offsets is not None:
+            ways = zip((x, y, z), self.offsets.T.tolist(), strict=True)
+            x, y, z = (place + polynomial(coefficients, s) for place, coefficients in ways)
+        roll = zero + polynomial(self.rolls.tolist(), s)
         return ToolJets(x, y, z, self.target.pitch + 0.0 * sigma, roll)
 
 
@@ -347,7 +346,7 @@ class PoseTurn(_OneFormula):
 
     def at(self, sigma: Jet) -> ToolJets:
         """Return the pose at `sigma`, one place or many."""
-        sine, cosine = sin_cos(_polynomial(self.angles.tolist(), sigma))
+        sine, cosine = sin_cos(polynomial(self.angles.tolist(), 2.0 * sigma - 1.0))
         arm = self.start.position - self.point
         x, y, z = (
             place + offset
@@ -390,15 +389,6 @@ def arc_between(
 def _evenly_turned(points: Curve, start: ToolTarget, end: ToolTarget) -> TurnedCurve:
     """Return the curve along ``points`` on which the tool turns about one axis."""
     return TurnedCurve(points, start.R, so3.log(end.R @ start.R.T))
-
-
-def _polynomial(coefficients: Sequence[float], sigma: Jet) -> Jet:
-    """Return the polynomial of 2 sigma - 1."""
-    *lower, highest = coefficients
-    s, value = 2.0 * sigma - 1.0, highest + 0.0 * sigma
-    for coefficient in reversed(lower):
-        value = value * s + coefficient
-    return value
 
 
 def _terms(v: FloatArray, axis: FloatArray) -> Terms:
