@@ -9,7 +9,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -260,18 +260,17 @@ def ik(options: Namespace) -> int:
     return answer_lines(kinematics.ik)
 
 
-def answer_lines(answer: Answer, source: TextIO | None = None, sink: TextIO | None = None) -> int:
-    """Answer each line when it arrives and return the exit status.
+def answer_lines(answer: Answer) -> int:
+    """Answer each line of the input when it arrives and return the exit status.
 
     A wrong line is answered by ``{"error": ...}`` with its number, counted from 1; the next lines
     are answered as usual. The status is 1 if there were requests and all were wrong, else 0.
     """
-    if source is None and isinstance(sys.stdin, io.TextIOWrapper):
+    if isinstance(sys.stdin, io.TextIOWrapper):
         # Bytes that are not UTF-8 make only their own line wrong.
         sys.stdin.reconfigure(encoding="utf-8", errors="replace")
-    source, sink = source or sys.stdin, sink or sys.stdout
     requested = answered = 0
-    for number, line in enumerate(source, start=1):
+    for number, line in enumerate(sys.stdin, start=1):
         if not line.strip():
             continue
         requested += 1
@@ -280,7 +279,7 @@ def answer_lines(answer: Answer, source: TextIO | None = None, sink: TextIO | No
             answered += 1
         except InputError as error:
             reply = {"error": f"line {number}: {error}"}
-        print(json.dumps(reply, allow_nan=False), file=sink, flush=True)
+        print(json.dumps(reply, allow_nan=False), flush=True)
     return int(requested > answered == 0)
 
 

@@ -158,8 +158,7 @@ class ArmMachine(ArmModes):
         super().end_act(now)
         if self.mode is ArmMode.CALIBRATING and self._procedure is not None:
             self._procedure.close()
-            axes = DRIVEN
-            self._start(halt(self.arm, axes, self._encoders, now, CALIBRATION_ENDED), now)
+            self._start(halt(self.arm, DRIVEN, self._encoders, now, CALIBRATION_ENDED), now)
         elif self.wants_link and not self.mode.follows:
             self._must_freeze = True
 
@@ -286,8 +285,7 @@ class ArmMachine(ArmModes):
         if self._must_freeze:
             self._must_freeze = False
             if self.arm.axes_in(*IN_MOTION, AxisStatus.CALIBRATING):
-                axes = DRIVEN
-                self._start(halt(self.arm, axes, self._encoders, now, MOVED_BY_ITSELF), now)
+                self._start(halt(self.arm, DRIVEN, self._encoders, now, MOVED_BY_ITSELF), now)
                 return
         if self._stop_asked is not None:
             press, self._stop_asked = self._stop_asked, None
