@@ -25,7 +25,8 @@ from tests.conftest import LONG
 from tests.recording.dataset_files import episode, write_copy
 from tests.recording.recorded import described, record
 
-CHANGES = 600 if LONG else 5
+# The time of a state is 1e300 s in number 233.
+CHANGES = range(600) if LONG else (0, 1, 2, 3, 233)
 ODD: tuple[Any, ...] = (
     None,
     True,
@@ -93,7 +94,7 @@ def exports(path: Path, out: Path) -> None:
                 work()
 
 
-@pytest.mark.parametrize("number", range(CHANGES))
+@pytest.mark.parametrize("number", CHANGES)
 def test_changed_recording_is_refused_or_exported(run: Path, tmp_path: Path, number: int) -> None:
     path = write_copy(run, tmp_path / "changed.mcap", change=changing(random.Random(number)))
     exports(path, tmp_path)

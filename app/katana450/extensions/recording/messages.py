@@ -44,7 +44,17 @@ SHARED_TOPICS: Final = {"Plan": PLANS, "Solid": SOLIDS}
 MAX_COMMANDS = 10_000
 """Maximum number of commands of a tick."""
 
-Time = Annotated[float, Meta(description="time [s] on the clock of the recording, as log_time")]
+MAX_TIME = 1e10
+"""[s] Greatest time of a message: 300 years fit into the nanoseconds of a log_time."""
+
+Time = Annotated[
+    float,
+    Meta(
+        ge=-MAX_TIME,
+        le=MAX_TIME,
+        description="time [s] on the clock of the recording, as log_time",
+    ),
+]
 Form = Annotated[Any, Meta(description="exact form of a value; see docs/recording.md")]
 Joints = Annotated[list[float], Meta(description="one number for each joint [rad or m]")]
 Point = Annotated[tuple[float, float, float], Meta(description="x, y, z in the base frame")]
@@ -88,7 +98,7 @@ class TickMessage(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True
     """
 
     t: Time
-    t_before: float | None = None
+    t_before: Time | None = None
     commands: Annotated[tuple[GivenCommand, ...], Meta(max_length=MAX_COMMANDS)] = ()
     sent: SentAnswer | None = None
     failed: bool = False
