@@ -19,9 +19,6 @@ let tell = () => {};
 const boxOf = (target) => (target instanceof HTMLInputElement && target.matches(NUMBER_BOX) ? target : null);
 const stopped = () => window.parent.document.body.dataset.mood === "stopped";
 
-/** @param {HTMLInputElement} field */
-const changed = (field) => field.value !== Viser.shownIn(field);
-
 /** Return the draft of a box with a point for the comma of a number, such as 12,5. @param {HTMLInputElement} field */
 const draft = (field) => field.value.trim().replace(/^([-+]?\d*),(\d*)$/, "$1.$2");
 
@@ -55,7 +52,7 @@ function restore(field) {
 
 /** @param {HTMLInputElement} field */
 function commit(field) {
-  if (!changed(field)) return mark(field, false);
+  if (field.value === Viser.shownIn(field)) return mark(field, false);
   const why = objection(field);
   mark(field, why !== "");
   if (why) return tell(`${range(field).label}: ${field.value || "nothing"} ${why}. It was not sent.`);

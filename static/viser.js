@@ -277,11 +277,11 @@ export function keepControls(controls, messages) {
 /** Return the row of the control in which `target` is, or a larger part of the page outside of them. @param {EventTarget | null} target */
 export const rowOf = (target) => (target instanceof Element ? target.closest(":has(label[for])") : null);
 
-/** Return id and label of the control of a number box, and the index of the box in it. @param {Element} box */
+/** Return id and label of the control of a number box or of its buttons, and the index of the box in it. @param {Element} box */
 export function controlOf(box) {
   const row = rowOf(box);
   const label = row?.querySelector("label[for]");
-  const index = row ? [...row.querySelectorAll(NUMBER_BOX)].indexOf(box) : 0;
+  const index = row ? [...row.querySelectorAll(NUMBER_BOX)].findIndex((other) => other.parentElement?.contains(box)) : 0;
   return { id: label?.getAttribute("for") ?? "", label: label?.textContent ?? "", index };
 }
 
@@ -291,7 +291,7 @@ export const shownIn = (box) => box.defaultValue;
 // Fill a number box without the page's notice. The page compares the value with its own last one by
 // the element's own property.
 /** @param {HTMLInputElement} box @param {string} text */
-export const fill = (box, text) => valueOfBox?.set?.call(box, text);
+export const fill = (box, text) => valueOfBox?.set?.call(box, window.translated?.(text) ?? text);
 
 // Fill a number box as if the text were typed. The box is emptied first, because the page takes the
 // difference for a single edit at the caret.

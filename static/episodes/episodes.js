@@ -193,7 +193,7 @@ export class Episodes {
 
   /** @param {Episode} episode */
   #row(episode) {
-    const { number, outcome, start, end, recorded, bytes, task, note, file } = episode;
+    const { number, outcome, start, end, bytes, task, note, file } = episode;
     const length = extent(end - start, episode.missing_ticks);
     const summary = html("summary", { "data-key": number }, html("b", {}, `${number}`), html("span", {}, length), html("i", { class: outcome }, OUTCOMES[outcome]), html("span", {}, task));
     const row = html("details", this.#open.has(number) ? { open: "" } : {}, summary);
@@ -208,7 +208,7 @@ export class Episodes {
     /** @param {object} body */
     const ask = (body) => this.#ask({ ...body, number });
     /** @param {number} value */
-    const seconds = (value) => ({ type: "number", step: 0.1, min: 0, max: recorded.toFixed(1), value: value.toFixed(1) });
+    const seconds = (value) => ({ type: "text", inputmode: "decimal", autocomplete: "off", value: value.toFixed(1) });
     const select = html("select", {}, ...Object.entries(OUTCOMES).slice(0, outcome === "unfinished" ? 4 : 3).map(([value, words]) => html("option", { value, ...(value === outcome && { selected: "" }) }, words)));
     select.addEventListener("change", () => ask({ do: "judge", outcome: select.value }));
     const discard = button("Discard", () => ask({ do: "discard" }), { "data-key": `${number} kept` });

@@ -90,7 +90,7 @@ function translateAttributes(element) {
   }
 }
 
-/** Show the value of a drop-down in the language; scripts read and write it in English. @param {HTMLInputElement} input */
+/** Show the value of a drop-down or a number in the language; scripts read and write it in English. @param {HTMLInputElement} input */
 function translateValue(input) {
   const shownValue = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value");
   const value = Object.getOwnPropertyDescriptor(input, "value") ?? shownValue;
@@ -101,7 +101,11 @@ function translateValue(input) {
     value?.set?.call(input, next);
     shownValue?.set?.call(input, translated(next));
   };
-  const get = () => (shownValue?.get?.call(input) === translated(words) ? words : value?.get?.call(input));
+  const isNumber = input.inputMode === "decimal";
+  const get = () => {
+    const now = shownValue?.get?.call(input);
+    return isNumber ? now.replace(point, ".") : now === translated(words) ? words : value?.get?.call(input);
+  };
   Object.defineProperty(input, "value", { configurable: true, get, set });
   input.value = words;
 }
@@ -112,7 +116,7 @@ function translate(root) {
   for (let node = /** @type {Node | null} */ (root); node; node = nodes.nextNode()) {
     if (node instanceof Text) translateText(node);
     else if (node instanceof Element) translateAttributes(node);
-    if (node instanceof HTMLInputElement && node.matches("[role=combobox]")) translateValue(node);
+    if (node instanceof HTMLInputElement && node.matches("[role=combobox], [inputmode=decimal]:not([type=number])")) translateValue(node);
   }
 }
 

@@ -29,6 +29,7 @@ export class Values {
       // What is being typed stays.
       if (field.text !== text) field.input.value = field.text = text;
       set(field.input, "title", about);
+      set(field.input, "data-line", line ?? "");
       write(field.unit, step ? unit : "");
       const problem = !before && problems.find((other) => other.line === line && (other.column === column || (!other.column && values.length === 1)));
       write(field.why, (problem && problem.column && problem.text) || "");
@@ -39,15 +40,25 @@ export class Values {
 
   /** @param {Value} value @param {number} i */
   #add({ name, options = [], free, step, low = -Infinity, high = Infinity }, i) {
-    const box = () => html("input", step ? { type: "number", step } : { spellcheck: "false", autocomplete: "off", autocapitalize: "off" });
+    // The browser writes numbers in its own language, which need not be that of the page.
+    const box = () => html("input", step ? { type: "text", inputmode: "decimal", autocomplete: "off" } : { spellcheck: "false", autocomplete: "off", autocapitalize: "off" });
     const input = options.length && !free ? html("select", {}, ...options.map((word) => new Option(word))) : box();
     const [unit, why] = [html("span"), html("em")];
     this.#fields[i] = { input, unit, why, text: "", name };
     input.addEventListener("change", () => {
       const words = input.value.trim();
-      input.value = !words ? this.#fields[i].text : step ? String(clamp(Number(words), low, high)) : words;
-      if (words) this.#change(i, input.value);
+      const value = clamp(Number(words.replace(",", ".")), low, high);
+      const isWrong = !words || (step && Number.isNaN(value));
+      input.value = isWrong ? this.#fields[i].text : step ? String(value) : words;
+      if (!isWrong) this.#change(i, input.value);
     });
+    input.onkeydown = (event) => {
+      const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+      if (!step || !sign) return;
+      event.preventDefault();
+      input.value = String(Number((Number(input.value.replace(",", ".")) + sign * step).toFixed(6)));
+      input.dispatchEvent(new Event("change"));
+    };
     const words = (free ? options : []).map((word) => button(word, () => this.#change(i, word)));
     return html("div", {}, html("label", {}, html("span", {}, name), input, unit), ...words, why);
   }
