@@ -126,6 +126,7 @@ export class Bar {
     body.dataset.mood = proven ? "stopped" : "starting";
     offer(false);
     text("holder", "Driver unknown");
+    text("name", status.name);
     Pace.draw(null);
     head(proven ? "Stopped" : "No connection");
     text("why", proven ?? "");

@@ -260,8 +260,8 @@ class PoseForm:
         self._fill(forward(self._arm.chain_to(state.tool), state.goal))
         self._frame.on_update(self._change_display)
         # viser shows the label of a row as the name of the pose, and each button by its own text.
-        copy = gui.add_button("Copy current", hint="Fills in the present pose of the tool")
-        copy.on_click(self._copy)
+        hint = "Fills in the present pose of the tool"
+        gui.add_button("Copy current", color="gray", hint=hint).on_click(self._copy)
         go = gui.add_button("Go to pose", hint="Or to the nearest possible pose")
         listen(go, lambda: cmd.Pose(self.display.pose(self._position.value, self._angles.value)))
 
