@@ -1,6 +1,7 @@
 // Hold to move: keys, pads, gamepad and SpaceMouse, added up to five rates, six with a yaw, or seven with the elbow. An input that is released,
 // unplugged or in a hidden tab counts as zero, and without new messages the arm comes to rest.
 import { byId, first, write } from "./dom.js";
+import { clamp } from "./instruments/shape.js";
 import { messageOf } from "./server.js";
 
 /** @typedef {"plane" | "lift"} Pad */
@@ -87,10 +88,8 @@ function listen(pad, rates, place) {
   /** @param {PointerEvent} event */
   const drag = (event) => {
     const { left, top, width, height } = pad.getBoundingClientRect();
-    /** @param {number} value */
-    const limit = (value) => Math.max(-1, Math.min(1, value));
-    const right = limit((2 * (event.clientX - left)) / width - 1);
-    const down = limit((2 * (event.clientY - top)) / height - 1);
+    const right = clamp((2 * (event.clientX - left)) / width - 1, -1, 1);
+    const down = clamp((2 * (event.clientY - top)) / height - 1, -1, 1);
     const [shownRight, shownDown] = place(rates, right, down);
     knob.style.translate =
       `${(shownRight * (width - 38)) / 2}px ${(shownDown * (height - 38)) / 2}px`;
@@ -186,7 +185,7 @@ function rates() {
   for (const axis of [5, 6]) if (!steps?.moves(axis)) sum[axis] = 0;
   // The elbow moves while the tool rests.
   if (sum.slice(0, 6).some(Boolean)) sum[6] = 0;
-  return sum.map((value, i) => Math.max(-1, Math.min(1, value)) * (i < 3 ? LINEAR : ANGULAR));
+  return sum.map((value, i) => clamp(value, -1, 1) * (i < 3 ? LINEAR : ANGULAR));
 }
 
 let sentAt = 0;

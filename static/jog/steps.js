@@ -1,7 +1,7 @@
 // Steps and gripper in the Jog sheet: one press moves the target by one step. Loaded with the sheet.
-import { element, first, styled } from "../dom.js";
+import { element, first } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
-import { readArm } from "../server.js";
+import { armWithStyle } from "../page/ready.js";
 
 const SIZES = [0, 0.1, 1, 10]; // mm or degrees; 0 to hold
 const RADIANS = Math.PI / 180;
@@ -24,10 +24,7 @@ export class Steps {
 
   /** Return the steps in the sheet `root`, once the description of the arm is there. @param {HTMLElement} root @param {Page.Say} say */
   static async in(root, say) {
-    const style = styled("steps.css", import.meta.url);
-    const arm = await readArm();
-    await style;
-    return new Steps(root, say, arm);
+    return new Steps(root, say, await armWithStyle("steps.css", import.meta.url));
   }
 
   /** @param {HTMLElement} root @param {Page.Say} say @param {Api.Arm} arm */

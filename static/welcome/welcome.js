@@ -1,7 +1,8 @@
 // The first steps: a card over the scene with three things to try, each with one click.
-import { element, sceneOf, styled, write } from "../dom.js";
+import { element, sceneOf, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
-import { messageOf, readArm, readState, request } from "../server.js";
+import { armWithStyle } from "../page/ready.js";
+import { messageOf, readState, request } from "../server.js";
 import { ScriptRun } from "../teach/run.js";
 
 const KEPT = "katana450.welcome"; // in the browser's storage, once the card was dismissed
@@ -32,10 +33,7 @@ export class Welcome {
 
   /** Return the card, which is shown, for the arm of the server. @param {Page.Context} page */
   static async on(page) {
-    const style = styled("welcome.css", import.meta.url);
-    const arm = await readArm();
-    await style;
-    return new Welcome(page, arm);
+    return new Welcome(page, await armWithStyle("welcome.css", import.meta.url));
   }
 
   /** @param {Page.Context} page @param {Api.Arm} arm */
