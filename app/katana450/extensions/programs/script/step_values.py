@@ -37,7 +37,7 @@ class StepValue(msgspec.Struct, frozen=True, omit_defaults=True):
         about: description for people.
         unit: unit of a number; empty for none.
         step: change of a number by a key; 0 if it is no number.
-        options: texts that it may be, the present one among them.
+        options: texts that it may be, the present one among them if it must be one of them.
         free: whether it may be something else.
         before, after: texts about a value that the step does not have yet, whose ``text`` is empty.
     """
@@ -175,7 +175,7 @@ def _scalar(value: YamlValue, variants: Iterable[Schema], names: Names, name: st
         about,
         "" if numeric is None else numeric.get("unit", ""),
         step,
-        tuple(dict.fromkeys((text, *words))) if words else (),
+        tuple(dict.fromkeys((text, *words) if numeric is None else words)) if words else (),
         numeric is not None,
     )
 
