@@ -32,6 +32,12 @@ export const isOnly = (blocks, i) =>
 export const indexAt = (blocks, line, place = Infinity) =>
   blocks.findLastIndex((own) => own.first <= line && line <= own.last && (line > own.line || own.column <= place));
 
+/** Return the number of each block, from 1, among the enabled ones without others in them; 0 for all else. @param {Block[]} blocks */
+export function numbersOf(blocks) {
+  let count = 0;
+  return blocks.map(({ enabled, depth }, i) => (enabled && !(blocks[i + 1]?.depth > depth) ? (count += 1) : 0));
+}
+
 // Return the places to which the block `i` can go, in the order of the lines: before each other block and at the end of
 // each list. `here` is the index of the place where it is.
 /** @param {Block[]} blocks @param {number} i */

@@ -1,21 +1,22 @@
 // The content of the sheet with its changes, which can be undone; kept in the browser for each arm.
-import { kept, restored } from "./poses.js";
+import { kept, nameIn, restored } from "./poses.js";
 
 /** @typedef {import("./poses.js").Kept} Kept */
 /** @typedef {import("./poses.js").Pose} Pose */
 const KEY = "katana450.teach";
 const MAX_CHANGES = 100;
+/** @type {Kept} */
+export const NEW = { name: "My script", times: 1, poses: [], text: null };
 
 export class Content {
   #storage;
   #key;
   #listener;
   /** @type {Kept[]} */
-  #past = [];
+  past = []; // what undo restores, the newest last
   /** @type {Kept[]} */
-  #future = [];
-  /** @type {Kept} */
-  now = { name: "My script", times: 1, poses: [], text: null };
+  future = []; // the same for redo
+  now = NEW;
   broken = false; // whether something else was kept
 
   // storage: of the browser; arm: the answer `arm`. `listener` is called after each change.
@@ -32,14 +33,6 @@ export class Content {
     }
   }
 
-  get undoable() {
-    return this.#past.length > 0;
-  }
-
-  get redoable() {
-    return this.#future.length > 0;
-  }
-
   /** The index of a pose; -1 without one. @param {string | null} id */
   indexOf(id) {
     return this.now.poses.findIndex((pose) => pose.id === id);
@@ -47,8 +40,8 @@ export class Content {
 
   /** @param {Partial<Kept>} fields */
   change(fields) {
-    this.#past = [...this.#past, this.now].slice(-MAX_CHANGES);
-    this.#future = [];
+    this.past = [...this.past, this.now].slice(-MAX_CHANGES);
+    this.future = [];
     this.#become({ ...this.now, ...fields });
   }
 
@@ -63,23 +56,24 @@ export class Content {
   }
 
   undo() {
-    const before = this.#past.pop();
+    const before = this.past.pop();
     if (!before) return;
-    this.#future.push(this.now);
+    this.future.push(this.now);
     this.#become(before);
   }
 
   redo() {
-    const after = this.#future.pop();
+    const after = this.future.pop();
     if (!after) return;
-    this.#past.push(this.now);
+    this.past.push(this.now);
     this.#become(after);
   }
 
   /** @param {Kept} now */
   #become(now) {
-    this.now = now;
-    this.#storage.setItem(this.#key, kept(now));
+    // A text has the name.
+    this.now = { ...now, name: nameIn(now.text ?? "") ?? now.name };
+    this.#storage.setItem(this.#key, kept(this.now));
     this.#listener();
   }
 }

@@ -1,5 +1,6 @@
 // The text of a script, with the numbers of its lines and what the server says about them.
 import { button, html } from "../instruments/shape.js";
+import { indexAt, numbersOf } from "./blocks.js";
 
 /** @typedef {{ line: number, text: string, column?: number }} Problem */
 /** @typedef {{ problems: Problem[], taught: import("./poses.js").Taught | null, blocks: import("./blocks.js").Block[] | null }} Reading */
@@ -46,10 +47,6 @@ export class Editor {
     this.explain([]);
   }
 
-  focus() {
-    this.#area.focus();
-  }
-
   /** Return what the server reads in a text, and show its problems. Without an answer return null. @returns {Promise<Reading | null>} */
   async check(text = this.text) {
     clearTimeout(this.#timer);
@@ -71,19 +68,22 @@ export class Editor {
     this.problems = problems;
     const lines = new Set(problems.map(({ line }) => line));
     [...this.#numbers.children].forEach((row, i) => row.classList.toggle("bad", lines.has(i + 1)));
-    this.list.replaceChildren(
-      ...problems.map(({ line, text }) =>
-        html("li", {}, button([html("b", {}, `Line ${line}`), ` ${text}`], () => this.#sheet.jump(line))),
-      ),
-    );
+    const blocks = this.reading?.blocks ?? [];
+    const order = numbersOf(blocks);
+    const rows = problems.map(({ line, text }) => {
+      const i = indexAt(blocks, line);
+      const place = `${order[i] ? `Step ${order[i]}, line` : "Line"} ${line}: ${blocks[i]?.title ?? ""}`;
+      return html("li", {}, button([html("b", {}, place), text], () => this.#sheet.showPlace(line)));
+    });
+    this.list.replaceChildren(...rows);
   }
 
-  /** Select a line. @param {number} line */
+  /** Take the focus, and select a line; 0 selects none. @param {number} line */
   select(line) {
     const lines = this.text.split("\n");
     const start = lines.slice(0, line - 1).reduce((sum, row) => sum + row.length + 1, 0);
     this.#area.focus();
-    this.#area.setSelectionRange(start, start + (lines[line - 1] ?? "").length);
+    if (line) this.#area.setSelectionRange(start, start + (lines[line - 1] ?? "").length);
   }
 
   #count() {

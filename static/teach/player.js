@@ -1,9 +1,8 @@
 // Planning and running what the sheet shows.
+import { addressed } from "../page/words.js";
 import { problemsOf } from "./editor.js";
 import { scriptOf } from "./poses.js";
 import { ScriptRun } from "./run.js";
-
-const PLANNING = "planning";
 
 export class Player {
   #page;
@@ -25,7 +24,7 @@ export class Player {
     const { plan } = this.#sheet;
     const { revocations } = this.#page.store.status ?? {};
     await this.#sheet.attempt(async () => {
-      if (order && plan.isShown && plan.used) return await this.run.steer(order, revocations);
+      if (order && plan.isShown && plan.used) return this.#page.say({ do: "steer", order, revocations });
       // Run soon after Preview: the plan is finished first, and kept.
       await this.#planning;
       if (this.run.busy) throw new Error("It is running. End it in the bar first.");
@@ -41,24 +40,25 @@ export class Player {
     const sheet = this.#sheet;
     const { now } = sheet.content;
     const isText = now.text !== null;
-    if (isText && (await sheet.editor.check())?.problems.length) return sheet.report("The script is not run: see the lines below.", true);
+    const refusal = order ? "The script is not run: see the mistakes below." : "The script is not previewed: see the mistakes below.";
+    if (isText && (await sheet.editor.check())?.problems.length) return sheet.report(refusal, true);
     const { text } = sheet.script();
     /** The index of the pose of a line; null for another line. @param {number} line */
     const poseAt = (line) => (isText ? null : scriptOf(now).poseAt(line));
     sheet.report("Planning …");
     const program = await this.run.play(text, order, revocations, ({ status, fraction, line, step, steps, task }) => {
-      if (status === PLANNING) return sheet.report(`Planning ${Math.round(100 * fraction)} %`);
+      if (status === "planning") return sheet.report(`Planning ${Math.round(100 * fraction)} %`);
       const index = poseAt(line);
       if (index !== null) sheet.mark(now.poses[index].id);
       sheet.report(index === null ? `Step ${step} of ${steps}: ${task}.` : `Pose ${index + 1} of ${now.poses.length}`);
     });
     const { status, steps, seconds, why } = program;
     if (status === "ready" && !order) sheet.report(`${steps} steps, about ${seconds.toFixed(1)} s.`);
-    else sheet.report(status === "done" ? "Done." : why.split("\n")[0] || "It was ended.", status !== "done");
+    else sheet.report(status === "done" ? "Done." : addressed(why.split("\n")[0], this.#page.store.status?.name ?? "") || "It was ended.", status !== "done");
     const problems = problemsOf(why);
     if (!problems.length) return;
     sheet.editor.explain(problems);
-    if (isText && status === "refused") return sheet.report("The script is not run: see the lines below.", true);
+    if (isText && status === "refused") return sheet.report(refusal, true);
     const pose = poseAt(problems[0].line);
     sheet.report(pose === null ? problems[0].text : `Pose ${pose + 1}: ${problems[0].text}`, true);
   }

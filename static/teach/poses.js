@@ -58,6 +58,15 @@ export function restsBecause(poses, i) {
   return next.speed === poses[i].speed ? "" : "The next motion has another speed.";
 }
 
+/** Return the name in the text of a script; undefined without one that is plain. @param {string} text */
+export const nameIn = (text) => /^name: *(["']?)([^"'\\#]+?)\1 *$/m.exec(text)?.[2].slice(0, 40);
+
+/** Return the text of a script with another name. @param {string} text @param {string} name */
+export function renamed(text, name) {
+  const row = `name: ${JSON.stringify(name)}\n`;
+  return /^name:.*\n/m.test(text) ? text.replace(/^name:.*\n/m, () => row) : row + text;
+}
+
 // Return {text, poseAt}: the script, and a function that returns the index of the pose of a line
 // that counts from 1; null for a line of no pose.
 /** @param {Omit<Kept, "text">} script */

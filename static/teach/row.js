@@ -17,7 +17,6 @@ const SHAPES = {
   copy: "M7 7h9v9H7zM4 13V4h9",
   off: "M10 3v7M6 5.5a6 6 0 1 0 8 0",
   add: "M10 4v12M4 10h12",
-  text: "M4 16l1-4 8-8 3 3-8 8zM11 6l3 3",
 };
 
 /** Return a button with a picture. @param {Shape} name @param {() => void} act @param {Node[]} words */

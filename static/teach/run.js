@@ -60,11 +60,6 @@ export class ScriptRun {
     }
   }
 
-  /** Steer the program that the server has. @param {Api.ProgramOrder} order @param {number | undefined} revocations */
-  steer(order, revocations) {
-    return this.#ask([{ do: "steer", order, revocations, id: this.#id }]);
-  }
-
   /** @param {Api.Act[]} requests */
   async #ask(requests) {
     /** @type {Promise<Page.Answer>[]} */

@@ -2,8 +2,9 @@
 // their times, marks and breakpoints.
 import { write } from "../dom.js";
 import { button, html, set } from "../instruments/shape.js";
-import { duplicated, indexAt, inserted, isOnly, moved, placeBeside, placesOf, removed, replaced, toggled } from "./blocks.js";
+import { duplicated, indexAt, inserted, isOnly, moved, numbersOf, placeBeside, placesOf, removed, replaced, toggled } from "./blocks.js";
 import { draggable } from "./order.js";
+import { scriptOf } from "./poses.js";
 import { drawn } from "./row.js";
 import { Values } from "./values.js";
 
@@ -14,7 +15,7 @@ const NEEDED = "Its list needs one step. Insert another one first, or change the
 
 /** @typedef {import("./blocks.js").Block} Block */
 /** @typedef {import("./blocks.js").Edit} Edit */
-/** @typedef {"up" | "down" | "copy" | "off" | "add" | "text" | "remove"} Name */
+/** @typedef {"up" | "down" | "copy" | "off" | "add" | "remove"} Name */
 /** @typedef {{ element: HTMLElement, pause: HTMLButtonElement, run: HTMLButtonElement, number: HTMLElement, name: HTMLButtonElement, note: HTMLElement, steps: number[] }} Row */
 
 export class Steps {
@@ -25,7 +26,7 @@ export class Steps {
   #blocks = []; // of the newest text that has some
   /** @type {string | null} */
   #asked = null; // the text that the server was asked to read
-  #line = 0; // a line of the block that is open
+  line = 0; // a line of the block that is open
   #column = Infinity; // a column behind its start
   #edits = Promise.resolve(); // the last one
   #list = html("ol", { class: "steps", "aria-label": "Steps" });
@@ -53,7 +54,6 @@ export class Steps {
         this.#open(Boolean(this.#menu.hidden));
         this.#menu.scrollIntoView({ block: "nearest" });
       }),
-      text: drawn("text", () => this.#sheet.jump(this.#line)),
       remove: drawn("remove", () => this.#edit("remove", removed)),
     };
     this.#acts = html("div", { class: "edit" }, this.#values.element, html("div", { class: "acts" }, ...Object.values(this.#buttons)), this.#menu);
@@ -61,14 +61,15 @@ export class Steps {
 
   /** Open the block at a place, and mark it. @param {number} line */
   select(line, column = Infinity) {
-    [this.#line, this.#column] = [line, column];
+    [this.line, this.#column] = [line, column];
     this.#open(false);
     this.draw();
     this.#rows[this.#opened]?.element.scrollIntoView({ block: "nearest" });
+    /** @type {HTMLElement | null} */ (this.#acts.querySelector(`[aria-invalid=true][data-line="${line}"]`))?.focus();
   }
 
   get #opened() {
-    return indexAt(this.#blocks, this.#line, this.#column);
+    return indexAt(this.#blocks, this.line, this.#column);
   }
 
   get #isCurrent() {
@@ -120,7 +121,7 @@ export class Steps {
 
   /** @param {Edit} edit @param {string} words */
   #take({ text, line }, words) {
-    [this.#line, this.#column] = [line, Infinity];
+    [this.line, this.#column] = [line, Infinity];
     this.#open(false);
     this.#sheet.content.change({ text });
     this.#sheet.report(words);
@@ -129,7 +130,7 @@ export class Steps {
   /** @param {string} step */
   async #insert(step) {
     const own = (await this.#fresh()) ? this.#blocks[this.#opened] : null;
-    const edit = inserted(this.#sheet.shownText ?? this.#sheet.emptyText, own ?? null, step);
+    const edit = inserted(this.#sheet.shownText ?? scriptOf({ ...this.#sheet.content.now, times: 1 }).text, own ?? null, step);
     this.#take(edit, `Inserted: ${step.split(":")[0]}.`);
     this.#buttons.add.focus();
   }
@@ -166,7 +167,8 @@ export class Steps {
     const wrong = new Set(this.#sheet.editor.problems.map(({ line }) => indexAt(this.#blocks, line)));
     while (this.#rows.length > this.#blocks.length) this.#rows.pop()?.element.remove();
     while (this.#rows.length < this.#blocks.length) this.#list.append(this.#add(this.#rows.length).element);
-    this.#blocks.forEach((block, i) => this.#show(i, block, numbers.get(`${block.line}:${block.column}`) ?? [], wrong.has(i)));
+    const order = numbers.size ? [] : numbersOf(this.#blocks);
+    this.#blocks.forEach((block, i) => this.#show(i, block, numbers.get(`${block.line}:${block.column}`) ?? [], wrong.has(i), order[i]));
     this.#drawActs(text);
   }
 
@@ -204,7 +206,6 @@ export class Steps {
       copy: ["Duplicate", locked],
       off: [enabled ? "Disable" : "Enable", needed],
       add: ["Insert after", locked],
-      text: ["Edit in the text", false],
       remove: ["Remove", needed],
     };
     for (const [name, control] of /** @type {[Name, HTMLButtonElement][]} */ (Object.entries(this.#buttons))) {
@@ -223,18 +224,14 @@ export class Steps {
     const [number, note] = [html("b", { title: "Drag to another place" }), html("span")];
     const name = button("", () => this.select(name.ariaExpanded === "true" ? 0 : this.#blocks[i].line, this.#blocks[i].column), { class: "name" });
     const element = html("li", {}, pause, run, number, name, note);
-    draggable(element, number, (from, _, over, after) => this.#drop(this.#indexOf(from), this.#indexOf(over), after));
+    draggable(element, number, (from, _, over, after) => this.#drop(from, over, after));
     this.#rows.push({ element, pause, run, number, name, note, steps: [] });
     return this.#rows[i];
   }
 
-  /** @param {HTMLElement} row */
-  #indexOf(row) {
-    return this.#rows.findIndex(({ element }) => element === row);
-  }
-
-  /** @param {number} from @param {number} over @param {boolean} after */
-  #drop(from, over, after) {
+  /** @param {HTMLElement} row @param {HTMLElement} target @param {boolean} after */
+  #drop(row, target, after) {
+    const [from, over] = [row, target].map((one) => this.#rows.findIndex(({ element }) => element === one));
     const [own, text] = [this.#blocks[from], this.#sheet.shownText];
     if (text === null || !this.#isCurrent || own.indent === null) return;
     if (isOnly(this.#blocks, from)) return this.#sheet.report(NEEDED, true);
@@ -242,8 +239,8 @@ export class Steps {
     if (place) this.#take(moved(text, own, place), `Move: ${own.title}.`);
   }
 
-  /** @param {number} i @param {Block} block @param {number[]} numbers its steps in the plan @param {boolean} isWrong */
-  #show(i, { title, depth, enabled, indent }, numbers, isWrong) {
+  /** @param {number} i @param {Block} block @param {number[]} numbers its steps in the plan @param {boolean} isWrong @param {number} [order] its place without a plan */
+  #show(i, { title, depth, enabled, indent }, numbers, isWrong, order) {
     const row = this.#rows[i];
     const { element, pause, run, number, name, note } = row;
     const planned = numbers.map((step) => this.#sheet.plan.steps[step - 1]);
@@ -264,7 +261,7 @@ export class Steps {
     set(run, "aria-label", isOne ? `Run from step ${numbers[0]}` : `Run from: ${title}`);
     pause.hidden = run.hidden = !numbers.length;
     number.classList.toggle("grip", indent !== null);
-    write(number, numbers.length ? String(numbers[0]) : "");
+    write(number, String(numbers[0] || order || ""));
     write(name, title);
     const times = round >= 0 && !isOne ? `${round + 1} of ${numbers.length}` : "";
     const words = [isWrong ? "mistake" : "", enabled ? "" : "disabled", mark ?? "", times, seconds ? `${seconds.toFixed(1)} s` : ""];

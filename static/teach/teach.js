@@ -1,15 +1,16 @@
 // The sheet of programs: one program at a time, as poses that are recorded and ordered, as its steps, or as text. It is
 // previewed, run and saved.
-import { element, first, styled, write } from "../dom.js";
-import { button, html, set } from "../instruments/shape.js";
-import { messageOf, readArm, readState } from "../server.js";
+import { element, first, write } from "../dom.js";
+import { button, clamp, html, set } from "../instruments/shape.js";
+import { armWithStyle } from "../page/ready.js";
+import { messageOf, readState } from "../server.js";
 import { thumbnail } from "../viser/pictures.js";
-import { Content } from "./content.js";
+import { Content, NEW } from "./content.js";
 import { Editor } from "./editor.js";
 import { draggable } from "./order.js";
 import { Plan } from "./plan.js";
 import { Player } from "./player.js";
-import { MAX_POSES, MAX_TIMES, fingersOf, poseOf, read, scriptOf } from "./poses.js";
+import { MAX_POSES, MAX_TIMES, fingersOf, poseOf, read, renamed, scriptOf } from "./poses.js";
 import { Row } from "./row.js";
 import { Scripts } from "./scripts.js";
 import { Steps } from "./steps.js";
@@ -18,12 +19,10 @@ import { Steps } from "./steps.js";
 const ID = "teach"; // id of the requests
 const [WIDTH, HEIGHT] = [96, 72]; // px of a picture
 const RADIANS = Math.PI / 180;
-const EMPTY = "There is no pose yet. Move the arm and add a pose.";
 const TEACH = "Move the arm, then press Add pose. Or choose a program above.";
 const NO_STEP = "There is no step yet. Insert the first one, or add poses.";
-const ERRORS = "The text has errors: see the lines below.";
+const ERRORS = "The script has mistakes: see below.";
 /** @typedef {"poses" | "steps" | "text"} View */
-const VIEWS = /** @type {const} */ ({ poses: "Poses", steps: "Steps", text: "Text" });
 
 export class Teach {
   #page;
@@ -46,11 +45,12 @@ export class Teach {
   #undo = button("↶", () => this.content.undo(), { "aria-label": "Undo in Programs", title: "Undo in Programs" });
   #redo = button("↷", () => this.content.redo(), { "aria-label": "Redo in Programs", title: "Redo in Programs" });
   #times = html("input", { type: "number", min: "1", max: MAX_TIMES, step: "1", inputmode: "numeric" });
+  #loop = html("label", {}, "Loop", this.#times, "times");
   #name = html("input", { maxlength: "40", spellcheck: "false", autocomplete: "off" });
   #views = {
-    poses: button(VIEWS.poses, () => this.#view === "poses" || this.#toPoses()),
-    steps: button(VIEWS.steps, () => this.#see("steps")),
-    text: button(VIEWS.text, () => this.#view === "text" || this.#toText()),
+    poses: button("Poses", () => this.#view === "poses" || this.#toPoses()),
+    steps: button("Steps", () => this.#see("steps")),
+    text: button("Text", () => this.#view === "text" || this.#toText()),
   };
   /** @type {View} */
   #view = "poses";
@@ -60,10 +60,7 @@ export class Teach {
 
   /** Return the sheet once it is styled and the arm is known. @param {Page.Context} page */
   static async in(page) {
-    const style = styled("teach.css", import.meta.url);
-    const arm = await readArm();
-    await style;
-    return new Teach(page, arm);
+    return new Teach(page, await armWithStyle("teach.css", import.meta.url));
   }
 
   /** @param {Page.Context} page @param {Api.Arm} arm */
@@ -76,18 +73,17 @@ export class Teach {
     const preview = button("Preview", () => this.#player.start(null), { title: "Plan it: show the path of the tool, and times and breakpoints of the steps" });
     const actions = html("div", { class: "bar" }, this.#play, this.#step, preview, html("div", { class: "history" }, this.#undo, this.#redo));
     const views = html("div", { class: "bar views", role: "group", "aria-label": "Show as" }, ...Object.values(this.#views), this.#add);
-    const loop = html("label", {}, "Loop", this.#times, "times");
     const named = html("label", { class: "wide" }, "Name", this.#name);
     const files = html("div", { class: "bar" }, ...this.scripts.controls);
-    const rest = html("div", { class: "rest" }, html("div", { class: "bar" }, named, loop), files);
+    const rest = html("div", { class: "rest" }, html("div", { class: "bar" }, named, this.#loop), files);
     const scrolled = html("div", { class: "scrolled" }, this.#empty, this.#list, this.#steps.element, this.editor.element);
     this.#sheet.append(this.scripts.open, actions, this.#says, this.#other, this.plan.look, views, scrolled, this.editor.list, rest);
     element("dock", HTMLElement).prepend(this.#sheet);
-    this.#times.addEventListener("change", () => {
-      const times = Math.min(Math.max(Math.round(this.#times.valueAsNumber) || 1, 1), MAX_TIMES);
-      this.content.change({ times });
+    this.#times.addEventListener("change", () => this.content.change({ times: clamp(Math.round(this.#times.valueAsNumber) || 1, 1, MAX_TIMES) }));
+    this.#name.addEventListener("change", () => {
+      const [name, { text }] = [this.#name.value.trim() || NEW.name, this.content.now];
+      this.content.change({ name, text: text === null ? null : renamed(text, name) });
     });
-    this.#name.addEventListener("change", () => this.content.change({ name: this.#name.value.trim() || "My script" }));
     if (this.content.now.text !== null) [this.editor.text, this.#view] = [this.content.now.text, "steps"];
     this.#draw();
     if (this.content.broken) this.report("What this browser had kept cannot be read, so the list is empty.");
@@ -111,7 +107,6 @@ export class Teach {
   report(words, bad = false) {
     write(this.#says, words);
     this.#says.classList.toggle("bad", bad);
-    this.#says.title = words;
   }
 
   /** Report why an act fails. @param {() => unknown} act */
@@ -121,10 +116,6 @@ export class Teach {
     } catch (error) {
       this.report(messageOf(error), true);
     }
-  }
-
-  get #poses() {
-    return this.content.now.poses;
   }
 
   // Poses
@@ -137,11 +128,11 @@ export class Teach {
 
   #record() {
     return this.attempt(async () => {
-      if (this.#poses.length >= MAX_POSES) throw new Error(`A script here has at most ${MAX_POSES} poses. Save it first.`);
+      if (this.content.now.poses.length >= MAX_POSES) throw new Error(`A script here has at most ${MAX_POSES} poses. Save it first.`);
       const pose = poseOf(await this.#state(), this.#arm, thumbnail(this.#page.scene, WIDTH, HEIGHT));
-      this.content.change({ poses: [...this.#poses, pose] });
+      this.content.change({ poses: [...this.content.now.poses, pose] });
       this.#rows.get(pose.id)?.element.scrollIntoView({ block: "nearest" });
-      this.report(`Pose ${this.#poses.length} is recorded.`);
+      this.report(`Pose ${this.content.now.poses.length} is recorded.`);
     });
   }
 
@@ -155,8 +146,8 @@ export class Teach {
   /** @param {string} id @param {number} to */
   move(id, to) {
     const from = this.content.indexOf(id);
-    if (to === from || to < 0 || to >= this.#poses.length) return;
-    const poses = [...this.#poses];
+    if (to === from || to < 0 || to >= this.content.now.poses.length) return;
+    const poses = [...this.content.now.poses];
     poses.splice(to, 0, ...poses.splice(from, 1));
     this.content.change({ poses });
     this.report(`Pose ${from + 1} is now pose ${to + 1}.`);
@@ -165,17 +156,17 @@ export class Teach {
   /** @param {string} id */
   remove(id) {
     const index = this.content.indexOf(id);
-    this.content.change({ poses: this.#poses.filter((pose) => pose.id !== id) });
+    this.content.change({ poses: this.content.now.poses.filter((pose) => pose.id !== id) });
     this.report(`Pose ${index + 1} is removed.`);
     // The focus stays in the list.
-    const near = this.#rows.get(this.#poses[Math.min(index, this.#poses.length - 1)]?.id);
+    const near = this.#rows.get(this.content.now.poses[Math.min(index, this.content.now.poses.length - 1)]?.id);
     const nextFocus = near ? first(".remove", HTMLElement, near.element) : this.#add;
     nextFocus.focus();
   }
 
   /** A pose that was read from a script without a gripper takes the present place of the fingers. @param {string} id */
   toggleGrip(id) {
-    const pose = this.#poses[this.content.indexOf(id)];
+    const pose = this.content.now.poses[this.content.indexOf(id)];
     return this.attempt(async () => {
       const gripper = pose.gripper ?? fingersOf(await this.#state(), this.#arm);
       this.content.changePose(id, { grips: !pose.grips, gripper });
@@ -185,7 +176,7 @@ export class Teach {
   /** The arm moves there by a command, like from its sliders. @param {string} id */
   go(id) {
     const index = this.content.indexOf(id);
-    const q = this.#poses[index].joints.map((angle) => angle * RADIANS);
+    const q = this.content.now.poses[index].joints.map((angle) => angle * RADIANS);
     this.report(`To pose ${index + 1}.`);
     this.#page.say({ do: "joints", q, revocations: this.#page.store.status?.revocations, id: `${ID} go` });
   }
@@ -200,21 +191,20 @@ export class Teach {
 
   // Texts
 
-  #toText() {
+  #toText(line = this.#steps.line) {
     if (this.content.now.text === null) {
       this.editor.text = scriptOf(this.content.now).text;
       this.content.change({ text: this.editor.text });
       this.report("Space types a blank in the text; Esc stops the arm.");
     }
     this.#see("text");
-    this.editor.focus();
+    this.editor.select(line);
   }
 
-  /** Show a line of the text; its block stays marked in the list of steps. @param {number} line */
-  jump(line) {
+  /** Show a place with a mistake: its step where steps are shown, and its line in the text. @param {number} line */
+  showPlace(line) {
     this.#steps.select(line);
-    this.#toText();
-    this.editor.select(line);
+    if (this.#view !== "steps" || !this.editor.reading?.blocks) this.#toText(line);
   }
 
   async #toPoses() {
@@ -229,7 +219,7 @@ export class Teach {
   /** @param {import("./poses.js").Taught} taught */
   #takeTaught({ name, times, poses }) {
     // Pictures belong to the angles.
-    const known = new Map(this.#poses.map((pose) => [pose.joints.join(), pose]));
+    const known = new Map(this.content.now.poses.map((pose) => [pose.joints.join(), pose]));
     const taken = poses.slice(0, MAX_POSES).map((taught) => {
       const pose = read(taught);
       const old = known.get(pose.joints.join());
@@ -242,10 +232,9 @@ export class Teach {
 
   // Return the name and the text of what the sheet shows. Throws an error if there is nothing.
   script() {
-    const { now } = this.content;
-    if (now.text !== null) return { name: now.name, text: this.editor.text };
-    if (!now.poses.length) throw new Error(EMPTY);
-    return { name: now.name, text: scriptOf(now).text };
+    const text = this.shownText;
+    if (text === null) throw new Error("There is no pose yet. Move the arm and add a pose.");
+    return { name: this.content.now.name, text };
   }
 
   // The text of what the sheet shows; null without one.
@@ -253,11 +242,6 @@ export class Teach {
     const { now } = this.content;
     if (now.text !== null) return this.editor.text;
     return now.poses.length ? scriptOf(now).text : null;
-  }
-
-  // The text before the first step of a new script.
-  get emptyText() {
-    return `name: ${JSON.stringify(this.content.now.name)}\nsteps:\n`;
   }
 
   // Return the step that moves to the present pose.
@@ -268,7 +252,7 @@ export class Teach {
   // Show an empty list of poses.
   begin() {
     this.#view = "poses";
-    this.content.change({ name: "My script", times: 1, poses: [], text: null });
+    this.content.change(NEW);
   }
 
   /** Show a script: as poses if it has only these, otherwise its steps, or its text if this has errors. @param {string} text @param {string} name */
@@ -294,7 +278,7 @@ export class Teach {
   drawPlan() {
     const isSteps = this.#view === "steps";
     if (isSteps) this.#steps.draw();
-    this.#empty.hidden = isSteps ? this.shownText !== null : this.#view === "text" || this.#poses.length > 0;
+    this.#empty.hidden = isSteps ? this.shownText !== null : this.#view === "text" || this.content.now.poses.length > 0;
     write(this.#empty, isSteps ? NO_STEP : TEACH);
     const { isShown, used, answer } = this.plan;
     const isOther = used !== null && !isShown;
@@ -326,12 +310,12 @@ export class Teach {
     write(this.scripts.shown, name);
     this.plan.draw();
     this.drawPlan();
-    this.#times.disabled = isText;
+    this.#loop.hidden = isText;
     for (const [view, control] of Object.entries(this.#views)) set(control, "aria-pressed", view === this.#view);
     if (this.#times !== focused || this.#times.valueAsNumber !== times) this.#times.value = String(times);
     if (this.#name !== focused || this.#name.value.trim() !== name) this.#name.value = name;
-    set(this.#undo, "aria-disabled", !this.content.undoable);
-    set(this.#redo, "aria-disabled", !this.content.redoable);
+    set(this.#undo, "aria-disabled", !this.content.past.length);
+    set(this.#redo, "aria-disabled", !this.content.future.length);
   }
 
   /** @param {Pose[]} poses */

@@ -152,14 +152,11 @@ def sheet(new_page: ViserPage) -> ViserPage:
     return new_page
 
 
-def test_steps_are_edited_and_undone_and_the_text_follows(
-    sheet: ViserPage, artefacts: Path
-) -> None:
+def test_steps_are_edited_and_undone_and_the_text_follows(sheet: ViserPage) -> None:
     show(sheet, SCRIPT)
     titles = ["fill 100", "grasp cup", "repeat times 2", "wait 1", "nudge axis 1, by 20", "home"]
     sheet.wait_until(lambda: names(sheet) == titles, "the steps")
     open_block(sheet, "grasp cup")
-    sheet.keep(artefacts / "blocks.png")
     press(sheet, "Move up: grasp cup")
     grasp = "  # It may be gone.\n  - grasp: cup      # from the front\n"
     first = SCRIPT.replace(grasp, "").replace("  - fill", f"{grasp}  - fill")
@@ -192,7 +189,6 @@ def test_steps_are_edited_and_undone_and_the_text_follows(
     sheet.wait_until(lambda: names(sheet) == titles, "the steps")
     open_block(sheet, "home")
     press(sheet, "Insert after: home")
-    sheet.keep(artefacts / "blocks-menu.png")
     sheet.page.get_by_role("group", name="Insert after: home").get_by_text("repeat").click()
     added = "  - repeat:\n      times: 2\n      steps:\n        - wait: 1\n"
     wait_text(sheet, SCRIPT + added)
@@ -214,9 +210,15 @@ def test_value_is_changed_in_its_field_and_a_mistake_is_shown_there(sheet: Viser
     show(sheet, SCRIPT)
     open_block(sheet, "nudge axis 1, by 20")
     value = sheet.page.locator("#teach .values input").nth(1)
-    value.fill("900")
+    value.fill("900,5")
     value.press("Enter")
-    wait_text(sheet, SCRIPT.replace("by: 20", "by: 900"))
+    wait_text(sheet, SCRIPT.replace("by: 20", "by: 900.5"))
+    # A text has the name, which the field shows and changes.
+    name = sheet.page.get_by_label("Name", exact=True)
+    name.fill("Turn it")
+    name.press("Enter")
+    wait_text(sheet, 'name: "Turn it"\n' + SCRIPT.replace("by: 20", "by: 900.5"))
+    press(sheet, "Undo in Programs")
     sheet.page.locator("#teach .values em", has_text="not between -720 and 720").wait_for()
     press(sheet, "Undo in Programs")
     sheet.wait_until(lambda: value.input_value() == "20", "the value")
@@ -242,27 +244,28 @@ def test_step_is_dragged_into_a_block(sheet: ViserPage, touch: bool) -> None:
 
 
 @pytest.mark.long
-def test_mistakes_mark_their_steps_and_lead_to_their_lines(
-    sheet: ViserPage, artefacts: Path
-) -> None:
+def test_mistakes_mark_their_steps_and_lead_to_their_lines(sheet: ViserPage) -> None:
     wrong = SCRIPT.replace("fill", "fil").replace("by: 20", "by: far")
     show(sheet, wrong)
     problems = sheet.page.locator("#teach-problems button")
     sheet.wait_until(lambda: problems.count() == 2, "the problems")
     marked = sheet.page.locator("#teach .steps .wrong .name")
     sheet.wait_until(lambda: marked.all_inner_texts() == ["fil 100", "nudge axis 1, by far"], "it")
-    sheet.keep(artefacts / "blocks-mistakes.png")
+    press(sheet, "Preview")
+    sheet.wait_until(lambda: "not previewed" in says(sheet), "what is not done")
+    assert problems.nth(1).inner_text().startswith("Step 4, line 11: nudge axis 1, by far\n")
+    # The list shows the step and its field, the text the line.
     problems.nth(1).click()
+    assert sheet.page.get_by_role("button", name="Remove: nudge axis 1, by far").is_visible()
+    assert sheet.page.locator(":focus").get_attribute("aria-invalid") == "true"
+    press(sheet, "Text")
     selected = "(each) => each.value.slice(each.selectionStart, each.selectionEnd)"
     assert area(sheet).evaluate(selected) == "        - nudge: {axis: 1, by: far}"
-    press(sheet, "Steps")
-    assert sheet.page.get_by_role("button", name="Remove: nudge axis 1, by far").is_visible()
     # Of a text that is no YAML the last steps are shown, and where to mend it.
     show(sheet, wrong.replace("{axis", "axis"))
     sheet.wait_until(lambda: sheet.page.locator(".steps.lost").count() == 1, "the old steps")
     assert problems.count() == 1
     assert len(names(sheet)) == 6
-    sheet.keep(artefacts / "blocks-lost.png")
     problems.click()
     assert area(sheet).is_visible()
 

@@ -487,7 +487,7 @@ CHANGED = """({ Content }) => {
     // A change takes the place of what could be done again.
     act("redo");
     for (let i = 0; i < 3; i++) act("undo");
-    return [names, content.undoable, content.redoable];
+    return [names, content.past.length > 0, content.future.length > 0];
 }"""
 """Changes the name of a list; returns the name after each change, and what is still possible."""
 

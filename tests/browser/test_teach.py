@@ -160,7 +160,7 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
     problem = page.locator("#teach-problems button")
     problem.wait_for()
     line = area.input_value().count("\n")
-    assert re.match(rf"Line {line} .*did you mean 'wait'", problem.inner_text())
+    assert re.match(rf"Step 5, line {line}: wiat 1\n.*did you mean 'wait'", problem.inner_text())
     sheet.keep(artefacts / "teach-text-problem.png")
     press(sheet, "Run")
     sheet.wait_until(lambda: "not run" in says(sheet), "the refusal")
@@ -181,7 +181,7 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
     area.fill("name: Far\nsteps:\n  - home\n  - move: {x: 1900, y: 0, z: 0}\n")
     press(sheet, "Run")
     sheet.wait_until(lambda: page.locator("#teach-problems li").count() == 1, "it", seconds=PLAYED)
-    assert page.inner_text("#teach-problems").startswith("Line 4 ")
+    assert page.inner_text("#teach-problems").startswith("Step 2, line 4: move ")
     press(sheet, "Poses")
     sheet.wait_until(lambda: "no poses" in says(sheet), "the refusal")
     assert area.is_visible()
@@ -251,10 +251,6 @@ def test_script_is_saved_in_the_folder_and_listed(
     press(sheet, "Save")
     sheet.wait_until(lambda: "Saved as Two words" in says(sheet), "the answer")
     assert taught(parse((scripts / "Two words.yaml").read_text(encoding="utf-8"))) is not None
-    press(sheet, "Save")
-    sheet.wait_until(lambda: "exists already" in says(sheet), "the refusal")
-    # The browser notes the refusal on its console.
-    sheet.errors.clear()
     assert "Two words" in sheet.page.locator("#teach > select").inner_text()
     # A script of the library has other steps than poses.
     sheet.page.locator("#teach").get_by_label("Program", exact=True).select_option("Square")

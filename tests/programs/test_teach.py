@@ -15,7 +15,7 @@ from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.simulation import plan_script
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.script.script_files import LIBRARY, Scripts
+from katana450.extensions.programs.script.script_files import Scripts
 from katana450.extensions.programs.script.teach import TaughtPose, taught
 from katana450.resources import INCLUDED, URDF_PATH
 from katana450.settings import Settings
@@ -85,14 +85,6 @@ def test_poses_of_a_partial_repetition_are_written_out() -> None:
     teaching = taught(parse(text))
     assert teaching is not None
     assert (teaching.times, [pose.joints[0] for pose in teaching.poses]) == (1, [1.0, 1.0, 2.0])
-
-
-def test_a_saved_script_is_listed(tmp_path: Path) -> None:
-    scripts = Scripts(tmp_path)
-    scripts.save("Mine", TAUGHT)
-    assert next(iter(scripts.paths)) == "Mine"
-    assert scripts.text("Mine") == TAUGHT
-    assert len(scripts.paths) == 1 + len(list(LIBRARY.glob("*.yaml")))
 
 
 def test_scripts_of_the_library_are_offered_to_arms_with_their_tools(tmp_path: Path) -> None:
