@@ -11,8 +11,8 @@ import pytest
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.findings import LogEntry, entries_between
-from katana450.arm.control.state.messages import REASONS, STATUS, sentence
-from katana450.arm.control.state.state import Finding, Reason, State, Status
+from katana450.arm.control.state.messages import sentence
+from katana450.arm.control.state.state import Reason, State
 from tests.ticks import TICK, during
 
 
@@ -54,14 +54,3 @@ def test_changed_amount_makes_no_entry(session: Session, state: State) -> None:
     farther, more = run(session, far, [cmd.Position(np.array([0.95, 0.0, 0.1]))], 40)
     assert farther.findings[0].reason is Reason.OUT_OF_REACH
     assert [entry for entry in more if entry.finding.reason is Reason.OUT_OF_REACH] == []
-
-
-@pytest.mark.parametrize("reason", Reason)
-def test_every_reason_has_a_text(reason: Reason) -> None:
-    text = REASONS[reason](Finding(reason, 0.0123, axis=2, parts=("base_link", "table"), time=0.4))
-    assert len(text) > 10
-
-
-@pytest.mark.parametrize("status", Status)
-def test_every_status_has_a_text(status: Status) -> None:
-    assert STATUS[status]

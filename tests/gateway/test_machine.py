@@ -83,15 +83,6 @@ def test_arm_answer_gives_the_reason_for_joints_only(
     assert "Joints only." in described.notes[-1]
 
 
-def test_its_vrml_world_has_names(program: Client, robot: Robot) -> None:
-    slide = robot.joint_group.names[robot.joint_group.slides.index(True)]
-    axis = robot.axis(robot.joints[slide])
-    program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
-    assert program.query(answers.State).q[robot.joint_group.names.index(slide)] == pytest.approx(
-        0.05
-    )
-
-
 @pytest.fixture(scope="module")
 def on_table(tmp_path_factory: pytest.TempPathFactory) -> DescribedRobot:
     path = tmp_path_factory.mktemp("column") / "column.urdf"

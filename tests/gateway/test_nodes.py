@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from katana450.arm.robot.arm_reader import MountedArm
-from katana450.cli.main import main
 from katana450.client import RefusedError
 from katana450.server.api import requests
 from tests.exchange.joint_rotations import THERE, rotation
-from tests.exchange.vrml_reading import read_world
 from tests.gateway.virtual import Rows, VirtualServer
 
 
@@ -108,13 +104,3 @@ def test_objects_are_set_and_watched_by_name(local: VirtualServer) -> None:
             more=[{"node": "cup", "field": "rotation", "value": [0, 0, 1, 0]}],
         )  # fmt: skip
         lines.answer(do="release_lease")
-
-
-def test_server_and_exported_file_have_the_same_names(local: VirtualServer, tmp_path: Path) -> None:
-    """The file is written by the command."""
-    assert main(["export", "vrml", "--out", str(tmp_path)]) == 0
-    file = read_world((tmp_path / "katana450.wrl").read_text(encoding="utf-8")).named()
-    world = {node["node"]: node for node in json.loads(local.ask("/api/v1/world")[2])["nodes"]}
-    in_file = {name for name, node in file.items() if node.kind == "Transform"}
-    assert {"cup", "basin", "tcp", "flange", "axis_1"} <= in_file
-    assert in_file == world.keys()

@@ -85,14 +85,6 @@ def test_solutions_of_many_poses_are_not_iterated(shoulder_arm: katana450.Arm) -
         list(solutions)
 
 
-def test_nearest_pose_of_a_feasible_one_is_itself(arm: katana450.Arm) -> None:
-    T = arm.fk(Q)
-    best = arm.nearest(T)
-    np.testing.assert_allclose(best.T, T, atol=1e-12)
-    np.testing.assert_allclose(best.q, Q, atol=1e-9)
-    assert best.reason == ""
-
-
 def test_nearest_pose_reports_errors_and_reason(arm: katana450.Arm) -> None:
     T = arm.fk(arm.ready)
     far = T.copy()
@@ -127,12 +119,6 @@ def test_jacobians_are_the_derivative_of_forward_kinematics(arm: katana450.Arm) 
             (arm.jacobian(Q, body=True)[:, axis], se3.inverse(T) @ rate),
         ):
             np.testing.assert_allclose(se3.hat(V), hat, atol=1e-8)
-
-
-def test_tool_is_chosen_when_the_arm_is_loaded(mounted: MountedArm) -> None:
-    flange = katana450.load(tool="flange")
-    assert flange.tool == "flange"
-    np.testing.assert_array_equal(flange.fk(Q), forward(mounted.chain_to("flange"), Q))
 
 
 def test_reachability_map_is_in_the_base_frame(shoulder_arm: katana450.Arm) -> None:

@@ -89,12 +89,6 @@ def test_line_is_straight_and_keeps_the_tool_as_it_is(base_arm: katana450.Arm) -
     np.testing.assert_allclose(same.end, samples.q[-1], atol=1e-9)
 
 
-def test_goal_may_be_a_pose(base_arm: katana450.Arm) -> None:
-    q = np.array([1.0, -1.0, 1.4, 0.3, 0.2])
-    plan = base_arm.plan(base_arm.fk(q))
-    np.testing.assert_allclose(base_arm.fk(plan.end), base_arm.fk(q), atol=1e-9)
-
-
 def test_plan_keeps_clear_of_a_scene(tmp_path: Any) -> None:
     file = tmp_path / "scene.yaml"
     file.write_text(

@@ -59,12 +59,6 @@ def test_commands_and_events_are_listed(path: Path, records: list[TickRecord]) -
     assert [entry["number"] for entry in recording.events] == [100]
 
 
-def test_recording_verifies_itself(path: Path, records: list[TickRecord]) -> None:
-    result = katana450.open(path).verify()
-    assert result.identical
-    assert result.ticks == len(records) - 1
-
-
 def test_forks_equal_the_recording_to_the_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
