@@ -55,17 +55,13 @@ class PlanningWorker:
         """Reason for which no path was found, until the next command; empty without one."""
 
     @property
-    def last_ticket(self) -> int:
-        """The ticket of the newest command that was sent to the arm."""
-        return self._arm.last_ticket
-
-    @property
     def busy(self) -> bool:
         """True if a path is being planned, or is found and not started yet."""
-        return self._work is not None or self._state_publisher.snapshot.ticket < self.last_ticket
+        sent = self._arm.last_ticket
+        return self._work is not None or self._state_publisher.snapshot.ticket < sent
 
     def deliver(self, command: cmd.Command, actor: Actor | None) -> int:
-        """Implement ``CommandSink``. A command that is planned first gets no ticket of its own."""
+        """Send ``command`` as the arm does. One that is planned first gets no ticket of its own."""
         traits = [part.traits for part in command.parts]
         self.failure = ""
         is_planning = self._work is not None
@@ -80,7 +76,7 @@ class PlanningWorker:
         if command.traits.planned:
             self._session.check(command)
             self._plan(command, actor)
-            return self.last_ticket
+            return self._arm.last_ticket
         return self._arm.deliver(command, actor)
 
     def cancel(self) -> None:

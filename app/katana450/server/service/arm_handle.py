@@ -17,7 +17,6 @@ from katana450.arm.control.state.state import Outcome, State
 from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot, loads_of
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.pipes.front_end import FrontEnd
 from katana450.arm.runtime.pipes.state_publisher import LoopTiming, Snapshot
 from katana450.arm.runtime.planning_worker import PlanningWorker
@@ -51,7 +50,7 @@ class ArmHandle:
         self._front_end = front_end
         self._state_publisher = front_end.state_publisher
         self._planning_worker = planning_worker
-        self._sink: CommandSink = front_end if planning_worker is None else planning_worker
+        self._sink = front_end if planning_worker is None else planning_worker
         self._loads = loads_of(robot)
         self._measured: (
             tuple[tuple[str, CollisionWorld | None, bytes], tuple[Margins, FloatArray | None]]
