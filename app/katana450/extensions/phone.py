@@ -17,7 +17,7 @@ from starlette.routing import Route
 from katana450.server.api.fields import ROOT
 from katana450.server.service.limits import TokenBucket
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address
-from katana450.server.web.bodies import TOO_MANY
+from katana450.server.web.bodies import TOO_MANY, as_json
 from katana450.server.web.http_api import RouteContext
 
 CODES_PER_SECOND, CODES_BURST = 2.0, 10.0
@@ -65,7 +65,7 @@ def phone_routes(context: RouteContext) -> list[Route]:
             hub.stop_path.main_port,
             requires_link=authenticator.requires_link,
         )
-        return Response(msgspec.json.encode(address), media_type="application/json")
+        return as_json(address)
 
     return [Route(f"{ROOT}/phone", phone)]
 

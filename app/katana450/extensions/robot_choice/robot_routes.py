@@ -110,8 +110,7 @@ def routes(context: RouteContext) -> list[BaseRoute]:
 
     async def robots(request: Request) -> Response:
         context.identity(request)
-        answer = Choices(await asyncio.to_thread(choices, first))
-        return Response(msgspec.json.encode(answer), media_type="application/json")
+        return as_json(Choices(await asyncio.to_thread(choices, first)))
 
     async def upload(request: Request) -> Response:
         sender = context.driver(request, "upload files")
@@ -125,8 +124,7 @@ def routes(context: RouteContext) -> list[BaseRoute]:
         except ChoiceError as error:
             refused = answers.Refused(why=str(error), choices=list(error.choices))
             return as_json(refused, NOT_UNDERSTOOD)
-        answer = Kept(_uploaded(key, uploaded_robots()[key]))
-        return Response(msgspec.json.encode(answer), media_type="application/json")
+        return as_json(Kept(_uploaded(key, uploaded_robots()[key])))
 
     path = f"{ROOT}/robots"
     return [Route(path, robots), Route(path, upload, methods=["POST"])]
