@@ -131,12 +131,6 @@ def test_there_is_a_method_for_every_step() -> None:
     ] == []
 
 
-def test_saved_script_is_read_again(tmp_path: Path) -> None:
-    everything().save(tmp_path / "all.yaml")
-    text = (tmp_path / "all.yaml").read_text(encoding="utf-8")
-    assert len(parse(text).steps) == len(parse(ALL).steps)
-
-
 def test_alternatives_and_scenes_are_written(tmp_path: Path) -> None:
     with katana450.program() as p:
         p.scene([{"name": "a", "shape": "box", "size": [9, 9, 9], "pose": np.zeros(6)}])

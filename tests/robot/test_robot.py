@@ -81,11 +81,6 @@ def test_a_finger_that_mimics_nothing_is_driven_with_the_other(tmp_path: Path) -
     assert (angles["finger_right_joint"], angles["finger_left_joint"]) == (0.2, 0.2)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RobotDescriptionError, match=r"nowhere\.urdf"):
-        load(tmp_path / "nowhere.urdf")
-
-
 def energy(robot: Robot, q: FloatArray) -> float:
     """Return the potential energy [J] of the weight, from the position of each mass."""
     moved = (np.eye(4), *joint_frames(robot.require_arm().chain, q))

@@ -114,12 +114,6 @@ def test_stop_without_a_name_always_counts(mailbox: Mailbox) -> None:
         assert mailbox.drain().commands == [cmd.Stop()]
 
 
-def test_button_pressed_twice_gives_two_commands(mailbox: Mailbox) -> None:
-    mailbox.put(cmd.Home())
-    mailbox.put(cmd.Home())
-    assert len(mailbox.drain().commands) == 2
-
-
 def test_flood_is_refused_and_waiting_commands_are_kept(mailbox: Mailbox) -> None:
     for _ in range(CAPACITY):
         mailbox.put(cmd.Home())
