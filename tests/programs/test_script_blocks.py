@@ -57,11 +57,6 @@ def test_blocks_have_their_lines_and_the_comments_above_them() -> None:
     assert len({b.group for b in blocks(TEXT)}) == 5
 
 
-def test_places_are_those_of_the_steps_that_are_planned() -> None:
-    places = {(block.line, block.column) for block in blocks(TEXT)}
-    assert {(step.line, step.column) for step in parse(TEXT).steps} <= places
-
-
 def test_step_of_several_lines_is_commented_out() -> None:
     text = (
         "steps:\n- home\n# - repeat:\n#     times: 2\n#\n#     steps: [home]   # here\n# words\n"
