@@ -16,7 +16,7 @@ import { StopPress } from "./page/stop.js";
 import { storage } from "./page/storage.js";
 import { Store } from "./page/store.js";
 import { named, showToast } from "./page/words.js";
-import { PARAMETER } from "./viser/names.js";
+import { PARAMETER } from "./viser/address.js";
 
 const NOTE_EVERY = 100; // ms, minimum between two notes that this page is used
 const DRAW_EVERY = 200; // ms between two looks at the age of the picture

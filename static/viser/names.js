@@ -1,6 +1,4 @@
-// Names of viser's page: selectors of its elements, colours, and parameters of its address. docs/viser.md lists them.
-// Parameters of the page's address that set camera and resolution.
-export const PARAMETER = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr)$/;
+// Names of viser's page: selectors of its elements, and colours. docs/viser.md lists them.
 export const NUMBER_BOX = "input.mantine-NumberInput-input";
 // Below this width the panel lies over the scene. Selectors of the panel's box, handle and content,
 // and its colour.

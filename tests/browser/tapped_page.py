@@ -6,10 +6,11 @@ from katana450.assembly.page_routes import put_together
 from katana450.server.web.static_files import contents
 
 TAPPED = """
+import * as Address from "./viser/address.js";
 import * as Names from "./viser/names.js";
 import * as Pictures from "./viser/pictures.js";
 import * as Structure from "./viser.js";
-    const Viser = { ...Names, ...Pictures, ...Structure };
+    const Viser = { ...Address, ...Names, ...Pictures, ...Structure };
     Viser.forgoCode();
     const style = new CSSStyleSheet();
     style.replaceSync(Viser.STEADY);
