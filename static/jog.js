@@ -172,8 +172,7 @@ async function adopt(device) {
 function rates() {
   // Its button for STOP counts also with the sheet closed.
   const pad = gamepad();
-  if (!open) return none();
-  if (steps?.on) return none();
+  if (!open || steps?.on) return none();
   const sum = none();
   /** @param {number[]} other */
   const add = (other) => other.forEach((value, i) => (sum[i] += value));

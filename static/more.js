@@ -52,7 +52,6 @@ async function snapshot() {
 /** @param {Page.Context} context */
 export function begin(context) {
   page = context;
-  const { toast } = page;
   const toggle = () => (dialog.open ? dialog.close() : open());
   onClick("more-button", toggle);
   first("#who p", HTMLElement).addEventListener("click", toggle);
@@ -70,7 +69,7 @@ export function begin(context) {
   onClick("phone-bar", async () => {
     dialog.close();
     const { toggle } = await import("./more/phone.js");
-    toggle(toast);
+    toggle(page.toast);
   });
   page.store.follow(note);
 }

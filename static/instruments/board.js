@@ -16,8 +16,7 @@ export class Board {
     this.#changed = new Set(kept.getItem(KEY)?.split(","));
     this.instruments = catalogue;
     this.#entries = catalogue.map((instrument) => this.#entry(instrument));
-    const chips = this.#entries.map(({ chip }) => chip);
-    this.list = html("div", { class: "list", role: "group", "aria-label": "Instruments to show", hidden: "" }, ...chips);
+    this.list = html("div", { class: "list", role: "group", "aria-label": "Instruments to show", hidden: "" }, ...this.#entries.map(({ chip }) => chip));
     this.grid = html("div", { class: "grid" }, ...this.#entries.map(({ card }) => card));
     const sight = new IntersectionObserver((sights) => {
       for (const { target, isIntersecting } of sights) {

@@ -51,8 +51,7 @@ export class Row {
     };
     if (!fingers) this.#buttons.grip.hidden = true;
     this.handle.append(this.#picture, this.#number);
-    const row = html("div", { class: "acts" }, ...Object.values(this.#buttons));
-    this.element.append(this.handle, this.#values.element, row);
+    this.element.append(this.handle, this.#values.element, html("div", { class: "acts" }, ...Object.values(this.#buttons)));
   }
 
   /** Show the pose `i` of all; `current`: whether the arm moves to it. @param {Pose[]} poses @param {number} i @param {boolean} current */
