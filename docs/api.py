@@ -43,7 +43,7 @@ number or a text of your own; its answer has the same `id`. Without an `id` only
 | **HTTP** `GET`, `POST /api/v{version}/scene` | Download and upload of the scene as a .zip ([scenes](scenes.md)). An uploaded scene waits for a `load`. |
 | **HTTP** `GET /api/v{version}/scripts`, `scripts/NAME` | The names of the scripts of the folder of `--programs`, and of those of the library that the arm can do, and an example of each step; the text of one, such as `Pour`, for `program`. |
 | **HTTP** `GET /api/v{version}/script.schema.json` | The [JSON Schema](programs.md#in-an-editor) of scripts. |
-| **HTTP** `POST /api/v{version}/scripts`, `scripts/NAME` | The problems of the text in the body, line by line, its steps as blocks of lines, and its poses if it has only [these](programs.md#teaching); saves a valid text in the folder. |
+| **HTTP** `POST /api/v{version}/scripts`, `scripts/NAME` | The problems of the text in the body, line by line, its steps as blocks of lines, and its poses if it has only [these](programs.md#teaching); saves a valid text in the folder, with `?replace` over an old one. |
 | **HTTP** `POST /api/v{version}/stop?press=NAME` | `stop`, on the main port and on the [port of STOP](access.md#the-port-of-stop), which answers with the stage. `press` makes copies on both count once. |
 | **HTTP** `GET`, `POST /api/v{version}/episodes`, `GET episodes/NUMBER` | The list of [episodes](recording.md#episodes); starts, ends and judges them; the file of one. |
 | **HTTP** `GET /api/v{version}/openapi.json` | Description of this API for programs: OpenAPI 3.1. It describes `do`, `stop`, the answers of `query` and each message with its units, including those of extensions; the messages on the websocket and the TCP port are the same. |

@@ -10,6 +10,7 @@ export class Scripts {
   #sheet;
   open = html("select", { "aria-label": "Program" });
   shown = new Option("", ""); // the program that the sheet shows
+  #asked = ""; // name of the script that the next Save replaces
   #file = html("input", { type: "file", accept: ".yaml,.yml", "aria-label": "File of a script", hidden: "" });
   #keep = button("Save", () => this.#save(), { hidden: "", title: "Save in the folder of the server" });
   /** @type {Record<string, string>} */
@@ -31,6 +32,7 @@ export class Scripts {
     const { names, saves, steps } = await answer.json();
     this.#keep.hidden = !saves;
     this.examples = steps;
+    this.#asked = "";
     this.open.replaceChildren(this.shown, new Option("New poses", NEW), new Option("A file …", FILE), ...names.map((name) => new Option(name)));
     this.open.value = "";
   }
@@ -55,7 +57,11 @@ export class Scripts {
   #save() {
     return this.#sheet.attempt(async () => {
       const { name, text } = this.#sheet.script();
-      await request(`api/v1/scripts/${encodeURIComponent(name)}`, { method: "POST", body: text });
+      const isAsked = this.#asked === name;
+      this.#asked = name;
+      const isListed = [...this.open.options].some(({ value }) => value === name);
+      if (isListed && !isAsked) throw new Error(`A script ${name} exists already. Press Save again to replace it.`);
+      await request(`api/v1/scripts/${encodeURIComponent(name)}${isAsked ? "?replace" : ""}`, { method: "POST", body: text });
       await this.list();
       this.#sheet.report(`Saved as ${name}. It is in the list of programs.`);
     });

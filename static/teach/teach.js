@@ -253,6 +253,7 @@ export class Teach {
   begin() {
     this.#view = "poses";
     this.content.change(NEW);
+    this.report("");
   }
 
   /** Show a script: as poses if it has only these, otherwise its steps, or its text if this has errors. @param {string} text @param {string} name */
@@ -298,8 +299,6 @@ export class Teach {
     // A row that was moved in the document has lost the focus.
     if (focused instanceof HTMLElement && this.#list.contains(focused) && focused !== document.activeElement) focused.focus();
     if (text !== null && text !== this.editor.text) this.editor.text = text;
-    const isText = text !== null;
-    this.#sheet.classList.toggle("text", isText);
     this.#list.hidden = this.#view !== "poses";
     this.#steps.element.hidden = this.#view !== "steps";
     this.editor.list.hidden = this.#view === "poses";
@@ -310,7 +309,7 @@ export class Teach {
     write(this.scripts.shown, name);
     this.plan.draw();
     this.drawPlan();
-    this.#loop.hidden = isText;
+    this.#loop.hidden = text !== null;
     for (const [view, control] of Object.entries(this.#views)) set(control, "aria-pressed", view === this.#view);
     if (this.#times !== focused || this.#times.valueAsNumber !== times) this.#times.value = String(times);
     if (this.#name !== focused || this.#name.value.trim() !== name) this.#name.value = name;

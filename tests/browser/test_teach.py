@@ -250,6 +250,10 @@ def test_script_is_saved_in_the_folder_and_listed(
     name.press("Enter")
     press(sheet, "Save")
     sheet.wait_until(lambda: "Saved as Two words" in says(sheet), "the answer")
+    press(sheet, "Save")
+    sheet.wait_until(lambda: "Press Save again" in says(sheet), "the question")
+    press(sheet, "Save")
+    sheet.wait_until(lambda: "Saved as Two words" in says(sheet), "the answer")
     assert taught(parse((scripts / "Two words.yaml").read_text(encoding="utf-8"))) is not None
     assert "Two words" in sheet.page.locator("#teach > select").inner_text()
     # A script of the library has other steps than poses.

@@ -70,6 +70,7 @@ def test_script_is_saved_once_and_can_be_read(server: VirtualServer, folder: Pat
     assert (folder / "Mine.yaml").read_text(encoding="utf-8") == POSES
     status, body = post(server, POSES, "/Mine")
     assert (status, b"exists already" in body) == (409, True)
+    assert post(server, POSES, "/Mine?replace") == (204, b"")
     status, _, body = server.ask("/api/v1/scripts")
     listed = json.loads(body)
     assert (listed["saves"], listed["names"][0]) == (True, "Mine")

@@ -70,12 +70,12 @@ class Scripts:
             raise InputError(f"The script {name!r} no longer exists.")
         return script_text(path)
 
-    def save(self, name: str, text: str) -> Path:
-        """Save a new script in the folder and return its path. Raises InputError if that fails."""
+    def save(self, name: str, text: str, *, replaces: bool = False) -> Path:
+        """Save a script and return its path; ``replaces`` an old one. Raises InputError."""
         if self._folder is None:
             raise InputError("This server has no folder for scripts: keep the script elsewhere.")
         path = self._folder / file_name(name)
-        if path.exists():
+        if path.exists() and not replaces:
             raise InputError(f"A script {name!r} exists already. Choose another name.")
         write_files({path: writer_of(text.encode())})
         return path

@@ -107,14 +107,14 @@ class ScriptRoutes:
         return await self._with_text(request, reading)
 
     async def _save(self, request: Request) -> Response:
-        """Save a text that is a valid script under a new name in the folder."""
+        """Save a text that is a valid script in the folder; ``?replace`` replaces an old one."""
         name = request.path_params["name"]
         sender = self._context.identity(request)
 
         def save(text: str) -> Response:
             parse(text)
             try:
-                self._scripts.save(name, text)
+                self._scripts.save(name, text, replaces="replace" in request.query_params)
             except InputError as error:
                 raise HTTPException(NOT_NOW, str(error)) from error
             return Response(status_code=204)
