@@ -306,12 +306,12 @@ def test_refused_request_leaves_the_lease_to_the_one_that_waits(
 def test_planned_path_is_waited_for(local: VirtualServer, watcher: Client) -> None:
     q = np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)).tolist()
     assert local.post(do="joints", q=q, wait=30)[1]["end"]["how"] == "reached"
-    status, done = local.post(do="branch", shoulder="back", elbow="up", wait=60)
+    status, done = local.post(do="branch", name="back-up", wait=60)
     assert (status, done["end"]["how"]) == (200, "reached")
     assert watcher.query(answers.State).branch == ("back", "up")
     assert local.post(do="joints", q=q, wait=60)[1]["end"]["how"] == "reached"
     with wall(watcher, (-0.1, 0.0, 0.4), [0.05, 0.3, 0.6]):
-        status, done = local.post(do="branch", shoulder="back", elbow="up", wait=60)
+        status, done = local.post(do="branch", name="back-up", wait=60)
         assert (status, done["end"]["how"]) == (409, "failed")
         assert "No path around the obstacles" in done["end"]["why"]
         assert done["end"]["q"] == watcher.query(answers.State).q == pytest.approx(q)
