@@ -18,6 +18,8 @@ let put = null; // the same, fitted
 let chosen = false;
 let riding = false; // the camera is on the tool and gets a new view at every step
 let begun = false;
+let pressed = false; // a pointer may hold a handle, under which the picture must stay
+let late = false; // the picture has changed its size meanwhile
 
 const root = () => world().matrixWorld;
 /** @param {number[]} xyz */
@@ -100,11 +102,18 @@ export function look(view) {
 }
 
 function refit() {
-  if (!base?.position.length || !base.look_at.length || riding) return;
+  late = pressed;
+  if (!base?.position.length || !base.look_at.length || riding || pressed) return;
   if (!drawing().canvas.clientHeight || !isSame(seen(), put ?? base)) return;
   put = fitted(base, corners());
   look(put);
 }
+
+for (const kind of ["pointerdown", "pointerup", "pointercancel"])
+  window.addEventListener(kind, ({ type }) => {
+    pressed = type === "pointerdown";
+    if (!pressed && late) refit();
+  }, { capture: true });
 
 /** Note the views that the server sets, and fit views that a person chose before viser gets them. @param {ViserPage.Message[]} messages */
 export function hear(messages) {

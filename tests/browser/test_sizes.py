@@ -108,6 +108,15 @@ def test_a_view_chosen_by_the_person_is_kept(desk: ViserPage) -> None:
     wait_whole(desk, "from the front")
     resize(desk, WIDE)
     wait_whole(desk, "from the front and wide")
+    # While a pointer may hold a handle the camera stays.
+    fitted = eye(desk)
+    desk.page.mouse.move(300, 500)
+    desk.page.mouse.down()
+    desk.page.set_viewport_size({"width": PORTRAIT[0], "height": PORTRAIT[1]})
+    desk.page.wait_for_timeout(500)
+    assert np.allclose(eye(desk), fitted, atol=1e-3)
+    desk.page.mouse.up()
+    wait_whole(desk, "after the release")
     turn(desk, "3D")
     wait_whole(desk, "again")
 
