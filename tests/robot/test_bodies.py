@@ -66,7 +66,7 @@ def test_drawn_shapes_count_only_where_no_link_has_collision_shapes(tmp_path: Pa
     robot, session, _ = find_robot(Settings(), tmp_path / "robot.urdf", None)
     assert session.world is not None
     assert [part.name for part in own(session.world)] == ["right", "follower"]
-    assert robot.cautions == ("Not checked for contacts: left.",)
+    assert robot.cautions == ("Not checked for contacts: 'left'.",)
 
 
 @pytest.mark.parametrize("length", [0.0, 1.0])

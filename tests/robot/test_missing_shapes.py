@@ -29,7 +29,7 @@ def read(tmp_path: Path, text: str) -> DescribedRobot:
     return find_robot(Settings(), saved(tmp_path, text), None)
 
 
-STICKS = "base_link, upper_arm, forearm, wrist_1, wrist_2"
+STICKS = "'base_link', 'upper_arm', 'forearm', 'wrist_1', 'wrist_2'"
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,7 @@ STICKS = "base_link, upper_arm, forearm, wrist_1, wrist_2"
     [
         (
             SHAPE.sub(MISSING, ur5e()),
-            ("Not checked for contacts: shoulder, wrist_3.", f"{ESTIMATED} {STICKS}."),
+            ("Not checked for contacts: 'shoulder', 'wrist_3'.", f"{ESTIMATED} {STICKS}."),
         ),
         (SHAPED.sub("", ur5e()), (f"{SHAPELESS} {STICKS}.",)),
     ],
@@ -89,7 +89,7 @@ def test_only_a_link_of_unknown_shape_is_estimated(
         forearm[0],
     )
     robot, session, _ = read(tmp_path, text.replace(forearm[0], replaced))
-    assert robot.cautions == (f"{ESTIMATED} forearm.",) * estimated
+    assert robot.cautions == (f"{ESTIMATED} 'forearm'.",) * estimated
     assert session.world is not None
     assert "forearm" in [part.name for part in session.world.parts]
 
@@ -97,8 +97,8 @@ def test_only_a_link_of_unknown_shape_is_estimated(
 def test_mechanism_without_its_meshes_keeps_its_table(tmp_path: Path) -> None:
     robot, session, _ = read(tmp_path, SHAPE.sub(MISSING, column()))
     assert robot.cautions == (
-        "Not checked for contacts: beam.",
-        f"{ESTIMATED} base.",
+        "Not checked for contacts: 'beam'.",
+        f"{ESTIMATED} 'base'.",
     )
     assert session.world is not None
     (table,) = (part for part in session.world.parts if part.name == "table")
@@ -108,15 +108,15 @@ def test_mechanism_without_its_meshes_keeps_its_table(tmp_path: Path) -> None:
 def test_sizes_and_places_that_look_wrong_are_named(tmp_path: Path) -> None:
     large = ur5e().replace('radius="0.037" length="0.06"', 'radius="37" length="60"')
     robot, _, _ = read(tmp_path, large)
-    assert robot.cautions == ("wrist_3 is 74 m long: check the unit of its shapes.",)
+    assert robot.cautions == ("'wrist_3' is 74 m long: check the unit of its shapes.",)
     deep = ur5e().replace('xyz="-0.196 0.0 0.007"', 'xyz="0 4 0"')
     robot, _, _ = read(tmp_path, deep)
     (overlap,) = robot.cautions
-    assert re.match(r"forearm and table overlap by \d+ mm where the robot starts", overlap)
+    assert re.match(r"'forearm' and 'table' overlap by \d+ mm where the robot starts", overlap)
     far = ur5e().replace('xyz="-0.425 0.0', 'xyz="-425.0 0.0').replace('xyz="-0.425', 'xyz="-425.0')
     robot, _, _ = read(tmp_path, far)
     assert robot.cautions == (
-        "forearm is 425 m from its parent upper_arm: check the origin of its joint.",
+        "'forearm' is 425 m from its parent 'upper_arm': check the origin of its joint.",
     )
 
 

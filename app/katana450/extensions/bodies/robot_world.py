@@ -101,7 +101,7 @@ def cautions(
         distance = float(np.linalg.norm(link.T_parent_link[:3, 3]))
         if distance > MAX_LENGTH:
             yield (
-                f"{link.name} is {short(distance)} m from its parent {link.parent}: check the "
+                f"{link.name!r} is {short(distance)} m from its parent {link.parent!r}: check the "
                 "origin of its joint."
             )
     if world is None:
@@ -111,11 +111,11 @@ def cautions(
     shaped = [link.name for link in robot.links if drawn(link) or link.name in unknown]
     unchecked = [name for name in shaped if name not in checked]
     if unchecked:
-        yield f"Not checked for contacts: {', '.join(unchecked)}."
+        yield f"Not checked for contacts: {', '.join(map(repr, unchecked))}."
     estimated = [part.name for part in world.parts if part.name in unknown]
     if estimated:
         reason = "the file gives no shapes" if _is_shapeless(robot) else "shapes cannot be read"
-        yield f"Contacts are estimated, because {reason}: {', '.join(estimated)}."
+        yield f"Contacts are estimated, because {reason}: {', '.join(map(repr, estimated))}."
     yield from _implausible(robot, world, x)
 
 
@@ -124,7 +124,7 @@ def _implausible(robot: Robot, world: CollisionWorld, x: FloatArray) -> Iterator
     sizes = np.array([_size(part) if part.name in own else np.inf for part in world.parts])
     for part, size in zip(world.parts, sizes.tolist(), strict=True):
         if MAX_LENGTH < size < np.inf:
-            yield f"{part.name} is {short(size)} m long: check the unit of its shapes."
+            yield f"{part.name!r} is {short(size)} m long: check the unit of its shapes."
     placed, owners = world.at(x), (world.part_of[world.first], world.part_of[world.second])
     limits = -np.minimum(sizes[owners[0]], sizes[owners[1]])
     for pair in placed.nearer_than(limits)[0].tolist():
@@ -132,7 +132,7 @@ def _implausible(robot: Robot, world: CollisionWorld, x: FloatArray) -> Iterator
         if depth > -limits[pair]:
             one, other = (world.parts[owner[pair]].name for owner in owners)
             yield (
-                f"{one} and {other} overlap by {short(1e3 * depth)} mm where the robot starts, "
+                f"{one!r} and {other!r} overlap by {short(1e3 * depth)} mm where the robot starts, "
                 "more than one of them is long: check the units and origins of their shapes."
             )
             return
