@@ -166,6 +166,7 @@ class Panel:
         limits, factor = self._model.limits, self._per_si[axis]
         low, high = ends(factor * float(limits.lower[axis]), factor * float(limits.upper[axis]))
         slides = self._model.slides[axis]
+        unit = " mm" if slides else "°"
         slider = self._gui.add_slider(
             # The number stands in messages too, and keeps the label apart from other controls.
             self._labels[axis],
@@ -173,8 +174,8 @@ class Panel:
             max=high,
             step=10.0 ** math.floor(math.log10((high - low) / MIN_STEPS)) if slides else TURN_STEP,
             initial_value=min(max(factor * float(state.goal[axis]), low), high),
-            hint=f"Axis {axis + 1}, {'mm' if slides else 'degrees'}: "
-            f"{signed(low, 2)} to {signed(high, 2)}",
+            marks=tuple((end, f"{signed(end, 2)}{unit}") for end in (low, high)),
+            hint=f"Axis {axis + 1}: {signed(low, 2)}{unit} to {signed(high, 2)}{unit}",
         )
         slider.precision = 2
         listen(slider, lambda: cmd.Joint(axis + 1, slider.value / factor))
@@ -189,6 +190,7 @@ class Panel:
             max=100.0,
             step=0.5,
             initial_value=self._opening(state.gripper_goal),
+            marks=((0.0, "0 %"), (100.0, "100 %")),
             hint=f"Percent open: 0 is closed ({named(fingers.closed)} at each finger), "
             f"100 is open ({named(fingers.opened)})",
         )
