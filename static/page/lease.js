@@ -4,6 +4,10 @@ import { button, html } from "../instruments/shape.js";
 
 const MAIN = { class: "main" };
 
+/** Whether a motion or a change of this person would be accepted if the arm is not stopped. @param {Page.Status | null} status */
+export const mayDrive = (status) =>
+  Boolean(status && status.role !== "viewer" && (status.mine || status.own_program || status.holder === null));
+
 /** Return the controls that a person has with this status. @param {Page.Status} status @param {Page.Say} say @returns {HTMLElement[]} */
 export function leaseControls(status, say) {
   const { mine, holder, role, asked, asking: requests, others } = status;

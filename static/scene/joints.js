@@ -2,6 +2,7 @@
 // one. A link that is dragged turns its joint; the pointer's events come from `stage.js`.
 import { element, repeating, sceneIn, write } from "../dom.js";
 import { button, html, signed } from "../instruments/shape.js";
+import { mayDrive } from "../page/lease.js";
 import { readState } from "../server.js";
 import { Glow, shapesOf } from "./glow.js";
 import { Grab } from "./grab.js";
@@ -76,7 +77,7 @@ export class Joints {
   /** Show that the pointer can take hold of a joint; null for none. @param {number | null} joint @param {Page.Pixel | null} pixel */
   hover(joint, pixel) {
     if (this.#drag) return;
-    const shown = this.mayDrive ? joint : null;
+    const shown = mayDrive(this.#page.store.live) ? joint : null;
     if (shown !== this.#hovered) {
       this.#hovered = shown;
       this.#light();
@@ -89,7 +90,7 @@ export class Joints {
   // the selected one, and so does a person who does not drive: the refusal then has a reason to be shown.
   /** @param {number | null} joint @param {boolean} touch @returns {joint is number} */
   takes(joint, touch) {
-    return joint !== null && !this.#drag && (joint === this.#selected || (!touch && this.mayDrive));
+    return joint !== null && !this.#drag && (joint === this.#selected || (!touch && mayDrive(this.#page.store.live)));
   }
 
   // Take hold of a joint at a hit {point} of the ray from a pixel.
@@ -251,12 +252,6 @@ export class Joints {
   /** @param {number} joint @param {number} value */
   #words(joint, value) {
     return this.#known.slides[joint] ? `${signed(1000 * value)} mm` : `${signed(DEGREES * value)}°`;
-  }
-
-  // Whether a drag of this person would be accepted if the arm is not stopped.
-  get mayDrive() {
-    const status = this.#page.store.live;
-    return Boolean(status && status.role !== "viewer" && (status.mine || status.own_program || status.holder === null));
   }
 
   // The description of the arm, which is there when a joint is under the pointer.

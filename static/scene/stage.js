@@ -1,6 +1,7 @@
 // The pointer in the scene: a click selects a link or an object, a drag of a link turns its joint, and a
 // double-click looks at a point. Everything else turns the camera.
 import { matches, sceneIn, styled } from "../dom.js";
+import { mayDrive } from "../page/lease.js";
 import { readArm } from "../server.js";
 import { Branches } from "./branches.js";
 import { Clearance } from "./clearance.js";
@@ -63,7 +64,7 @@ export class Stage {
       const stops = status.stopped && !stopped;
       stopped = Boolean(status.stopped);
       this.#fade();
-      if (stops || !this.joints.mayDrive) this.drop();
+      if (stops || !mayDrive(page.store.live)) this.drop();
     });
     document.addEventListener("visibilitychange", () => document.hidden && this.joints.lose());
     window.addEventListener("blur", () => this.#blur());
@@ -71,7 +72,7 @@ export class Stage {
 
   // Show in the panel whether its controls move the arm.
   #fade() {
-    const refused = !this.joints.mayDrive || Boolean(this.#page.store.status?.stopped);
+    const refused = !mayDrive(this.#page.store.live) || Boolean(this.#page.store.status?.stopped);
     this.#scene.contentDocument?.documentElement.toggleAttribute("data-refused", refused);
   }
 
