@@ -82,6 +82,14 @@ export function onConfirm(list, act) {
   list.addEventListener("blur", () => (list.value = ""));
 }
 
+/** Call `act` with each choice in a list, which then shows its first entry again. @param {HTMLSelectElement} list @param {(value: string) => void} act */
+export function onPick(list, act) {
+  list.addEventListener("change", () => {
+    act(list.value);
+    list.value = "";
+  });
+}
+
 // Whether the target of an event, of this document or of viser's, matches a selector.
 /** @param {EventTarget | null} target @param {string} selector @returns {target is HTMLElement} */
 export const matches = (target, selector) => Boolean(/** @type {Partial<Element> | null} */ (target)?.matches?.(selector));

@@ -7,7 +7,7 @@ export const GAP = 1.0; // s without a sample, above which a line is interrupted
 export class History {
   #times = new Float64Array(CAPACITY);
   #columns;
-  #count = 0; // number of all samples; the last CAPACITY of them are stored
+  end = 0; // number of all samples; the last CAPACITY of them are stored
 
   /** channels: [{label, of(state)}]; a missing number is NaN. @param {import("./channels.js").Channel[]} channels */
   constructor(channels) {
@@ -18,24 +18,20 @@ export class History {
   /** @param {Api.State} state */
   take(state) {
     const t = state.sent - state.t > AT_REST ? state.sent : state.t;
-    if (t < this.newest - RESTART) this.#count = 0;
+    if (t < this.newest - RESTART) this.end = 0;
     if (t <= this.newest) return;
-    const slot = this.#count % CAPACITY;
+    const slot = this.end % CAPACITY;
     this.#times[slot] = t;
     this.channels.forEach((channel, i) => (this.#columns[i][slot] = channel.of(state) ?? NaN));
-    this.#count += 1;
+    this.end += 1;
   }
 
   get newest() {
-    return this.#count ? this.time(this.#count - 1) : -Infinity;
+    return this.end ? this.time(this.end - 1) : -Infinity;
   }
 
   get first() {
-    return Math.max(0, this.#count - CAPACITY);
-  }
-
-  get end() {
-    return this.#count;
+    return Math.max(0, this.end - CAPACITY);
   }
 
   /** @param {number} n */

@@ -40,14 +40,12 @@ export class Knob {
     const middle = full ? 0 : (low + high) / 2;
     this.#turn = { of: (/** @type {number} */ value) => (value - middle) * scale, back: (/** @type {number} */ degrees) => degrees / scale };
     const limits = [low, high].map((limit) => onDial(RING, this.#turn.of(limit)));
-    this.#parts = {
-      way: svg("path", { class: "way" }),
-      pointer: svg("line", { class: "pointer", y1: -29, y2: -35 }),
-      mark: svg("circle", { class: "mark", cy: -RING, r: 5 }),
-      goal: html("output", { class: "goal" }, "–"),
-      now: html("span", { class: "now" }),
-    };
-    const { way, pointer, mark, goal, now } = this.#parts;
+    const way = svg("path", { class: "way" });
+    const pointer = svg("line", { class: "pointer", y1: -29, y2: -35 });
+    const mark = svg("circle", { class: "mark", cy: -RING, r: 5 });
+    const goal = html("output", { class: "goal" }, "–");
+    const now = html("span", { class: "now" });
+    this.#parts = { way, pointer, mark, goal, now };
     const range = svg("path", { class: "range", d: arc(RING, this.#turn.of(low), this.#turn.of(high)) });
     const ends = limits.map(([x, y]) => svg("circle", { class: "limit", cx: x.toFixed(2), cy: y.toFixed(2), r: 4 }));
     const picture = drawing("-53 -53 106 106", range, ...ends, way, svg("circle", { class: "cap", r: 40 }), pointer, mark);

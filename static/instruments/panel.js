@@ -1,10 +1,10 @@
 // The instrument panel: it queries states while it is open, stores them for a time and shows them.
-import { styled, write } from "../dom.js";
+import { repeating, styled, write } from "../dom.js";
 import { Board } from "./board.js";
 import { instruments } from "./catalogue.js";
 import { channelsOf } from "./channels.js";
 import { History } from "./history.js";
-import { toggle } from "./parts.js";
+import { radio, toggle } from "./parts.js";
 import { html } from "./shape.js";
 
 const HZ = 30;
@@ -32,7 +32,7 @@ export class Panel {
   #fresh = false;
   #heard = -Infinity;
   #took = 0;
-  #timer = 0;
+  #watch = repeating(() => this.#ask(), LOOK_EVERY);
   #frame = 0;
   #age = html("span", { class: "age", title: "Maximum age of the values" });
   #body = html("div", { class: "body" }, html("p", { class: "note" }, "Waiting for the arm."));
@@ -49,12 +49,10 @@ export class Panel {
   show(shown) {
     this.#root.hidden = !shown;
     this.#connection.watch(shown ? HZ : 0);
-    clearInterval(this.#timer);
+    this.#watch(shown);
     cancelAnimationFrame(this.#frame);
-    if (!shown) return this.#spring();
-    this.#ask();
-    this.#timer = setInterval(() => this.#ask(), LOOK_EVERY);
-    this.#draw();
+    if (shown) this.#draw();
+    else this.#spring();
   }
 
   /** Handle each event of the page's connection. @param {Page.LinkEvent} message */
@@ -107,12 +105,7 @@ export class Panel {
   }
 
   #toolbar() {
-    const spans = Object.entries(SPANS).map(([span, label]) => {
-      const choice = html("input", { type: "radio", name: "span", value: span });
-      choice.checked = Number(span) === this.#view.span;
-      choice.addEventListener("change", () => this.#look({ span: Number(span) }));
-      return html("label", {}, choice, html("span", {}, label));
-    });
+    const spans = Object.entries(SPANS).map(([span, label]) => radio("span", span, label, Number(span) === this.#view.span, () => this.#look({ span: Number(span) })));
     const pause = toggle("Pause", (on) => this.#look({ end: on ? (this.#history?.newest ?? null) : null }), {
       title: "Stop the plots; new values are still stored",
     });

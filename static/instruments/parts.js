@@ -1,5 +1,5 @@
 // Parts of instruments: buttons that stay pressed, and round scales.
-import { button, set } from "./shape.js";
+import { button, html, set } from "./shape.js";
 
 /** @typedef {import("./shape.js").Attributes} Attributes */
 /** Return a button that stays pressed until the next click. @param {Node | string | (Node | string)[]} content @param {(on: boolean) => void} change @param {Attributes} attributes */
@@ -10,6 +10,14 @@ export function toggle(content, change, attributes = {}) {
     change(on);
   }, { "aria-pressed": false, ...attributes });
   return control;
+}
+
+/** Return a labelled choice of a group; `act` is called when a person makes it. @param {string} name @param {string | number} value @param {string} label @param {boolean} checked */
+export function radio(name, value, label, checked, act = () => {}) {
+  const input = html("input", { type: "radio", name, value });
+  input.checked = checked;
+  input.addEventListener("change", act);
+  return html("label", {}, input, html("span", {}, label));
 }
 
 /** Return the point on a dial at `degrees`, clockwise from the top. @param {number} radius @param {number} degrees */

@@ -1,5 +1,6 @@
 // Steps and gripper in the Jog sheet: one press moves the target by one step. Loaded with the sheet.
 import { element, first } from "../dom.js";
+import { radio } from "../instruments/parts.js";
 import { button, html } from "../instruments/shape.js";
 import { armWithStyle } from "../page/ready.js";
 
@@ -31,6 +32,8 @@ export class Steps {
   constructor(root, say, arm) {
     this.#say = say;
     this.#arm = arm;
+    this.freedoms = arm.freedoms ?? 0; // number of numbers in a jog or a step of the tool
+    this.turnsElbow = arm.turns_elbow ?? false; // whether the elbow moves while the tool rests
     const sizes = SIZES.map((size) => radio("step", size, size ? `${size}` : "Hold", !size));
     const legend = html("legend", {}, "Step, mm or °");
     const pads = first("#pads", HTMLElement, root);
@@ -74,16 +77,6 @@ export class Steps {
   /** Return whether the arm has the motion of a place in AXES. @param {number} axis */
   moves(axis) {
     return axis === ELBOW ? this.turnsElbow : axis < 5 || this.freedoms === 6;
-  }
-
-  // Number of numbers in a jog or a step of the tool.
-  get freedoms() {
-    return this.#arm.freedoms ?? 0;
-  }
-
-  // Whether the elbow moves while the tool rests.
-  get turnsElbow() {
-    return this.#arm.turns_elbow ?? false;
   }
 
   /** Return whether the key was handled. moves: {code: [axis, sign]} of the keys that move. @param {KeyboardEvent} event @param {Moves} moves */
@@ -144,11 +137,4 @@ export class Steps {
       }),
     );
   }
-}
-
-/** @param {string} name @param {string | number} value @param {string} label @param {boolean} checked */
-function radio(name, value, label, checked) {
-  const input = html("input", { type: "radio", name, value });
-  input.checked = checked;
-  return html("label", {}, input, html("span", {}, label));
 }

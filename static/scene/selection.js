@@ -1,5 +1,5 @@
 // The selected object: its name with a button to remove it, and the arrows that move it, in this window alone.
-import { sceneIn, sceneOf, write } from "../dom.js";
+import { repeating, sceneIn, sceneOf, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { readObjects } from "../server.js";
 import { placeNear } from "./place_near.js";
@@ -14,7 +14,7 @@ export class Selection {
   #object = null;
   /** @type {Three.Object3D | null} */
   node = null; // that shows it
-  #timer = 0;
+  #watch = repeating(() => this.#refresh(), EVERY);
   #name = html("b");
   #bar;
 
@@ -71,19 +71,18 @@ export class Selection {
     if (this.#object?.name !== object?.name) this.#arrows(false);
     this.#object = object;
     this.node = object && node;
-    clearInterval(this.#timer);
     this.#bar.hidden = !object;
     this.#changed();
+    this.#watch(object !== null);
     if (!object) return;
     write(this.#name, object.name);
     // The sheet of objects, if it is open, shows the same one.
     window.dispatchEvent(new CustomEvent("selected", { detail: object.name }));
     this.#arrows(true);
-    this.#timer = setInterval(() => this.#refresh(object.name), EVERY);
   }
 
-  /** @param {string} name */
-  async #refresh(name) {
+  async #refresh() {
+    const { name } = this.#object ?? {};
     const object = (await readObjects()).find((other) => other.name === name && !other.held);
     if (this.#object?.name !== name) return;
     if (!object) return this.clear();

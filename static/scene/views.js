@@ -1,6 +1,6 @@
 // The view cube: it turns as the scene does, and its faces turn the camera. Below it are the views that are
 // no face, and Fit. For fingers, to which some faces are too narrow, a list replaces it.
-import { element, sceneIn, sceneOf } from "../dom.js";
+import { element, onPick, sceneIn, sceneOf } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { NARROW, PANEL } from "../viser/names.js";
 
@@ -17,8 +17,6 @@ const FACES = [
   ["Right", "Side", [0, -1, 0], [0, 0, 1]],
   ["Top", "Top", [0, 0, 1], [0, 1, 0]],
 ];
-/** @type {[Direction, Direction]} */
-const BELOW = [[0, 0, -1], [0, -1, 0]]; // the face without a view: the table is in front of it
 const MORE = [
   ["Iso", "3D", "Iso: view from above and the side"],
   ["Tool", "Tool", "View that follows the tool until another one is chosen"],
@@ -66,18 +64,11 @@ export class Views {
       face.style.transform = facing(out, up);
       this.#cube.append(face);
     }
-    const below = html("i", { "aria-hidden": "true" });
-    below.style.transform = facing(...BELOW);
-    this.#cube.append(below);
     const fit = button("Fit", () => this.#fit(), { title: "Show all of arm and handle" });
     const more = MORE.map(([label, view, name]) => choosing(label, view, name));
     const list = html("select", { "aria-label": "View" }, new Option("View", ""));
     for (const [label, view] of [...FACES, ...MORE]) list.add(new Option(label, view));
-    list.addEventListener("change", () => {
-      this.#choose(list.value);
-      // The same view can be chosen again.
-      list.value = "";
-    });
+    onPick(list, (view) => this.#choose(view));
     const row = html("div", {}, ...more, list, fit);
     this.#group = html("div", { id: "views", role: "group", "aria-label": "Camera" }, this.#cube, row);
     stage.append(this.#group);
