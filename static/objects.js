@@ -2,16 +2,16 @@
 import { byId, element, onChoice, save } from "./dom.js";
 import { button } from "./instruments/shape.js";
 import { chooseRobot } from "./more.js";
+import { messageOf, request } from "./server.js";
 
 const API = "api/v1/";
-const UNREACHABLE = "The server does not answer. Try again.";
 const ALONE = /\.(stl|ply|glb|3mf|zip)$/i; // what needs no other file
 const TOGETHER = "Files that belong together, such as a .gltf and its .bin, or a folder, are read from a .zip: put them into one.";
 const [ROBOT, ROBOT_INSIDE] = [/\.(urdf|xacro)$/i, /\.(urdf|xacro)/i]; // in a name, and in the names in a .zip file
 const MAX_BYTES = 60e6; // of a file; the server accepts no more
 const TAIL = 200_000; // bytes at the end of a .zip file in which the names of its files are
-/** @type {Page.Say} */
-let say = () => {};
+/** @type {Page.Context} */
+let page;
 const unit = element("unit", HTMLSelectElement);
 /** @type {File | null} */
 let file = null; // the last one that was chosen
@@ -29,20 +29,16 @@ function report(words, bad = false) {
   text.classList.toggle("bad", bad);
 }
 
-/** Send `body` and return the answer. A refusal is shown in the sheet, and null is returned. @param {string} path @param {File} body */
+/** Send `body`, if there is one, and return the answer. A refusal is shown in the sheet, and null is returned. @param {string} path @param {File} [body] */
 async function ask(path, body) {
   /** @type {NodeListOf<HTMLElement>} */
   const parts = document.querySelectorAll("#objects > :not(p)");
   for (const part of parts) part.inert = true; // nothing can be removed that the answer would place again
   try {
-    const answer = await fetch(API + path, { method: "POST", body });
-    const text = await answer.text();
-    if (answer.ok) return JSON.parse(text);
-    const refused = text.startsWith("{") ? JSON.parse(text) : { why: text };
-    report(refused.why, true);
-    offer(refused.choices ?? []);
-  } catch {
-    report(UNREACHABLE, true);
+    return await request(API + path, body && { method: "POST", body });
+  } catch (error) {
+    report(messageOf(error), true);
+    offer(/** @type {{ choices?: string[] }} */ (error).choices ?? []);
   } finally {
     for (const part of parts) part.inert = false;
   }
@@ -58,7 +54,7 @@ async function add(again) {
   if (unit.value) query.set("unit", unit.value);
   if (main) query.set("main", main);
   /** @type {Api.Mesh | null} */
-  const mesh = await ask(`mesh?${query}`, file);
+  const mesh = await (await ask(`mesh?${query}`, file))?.json();
   if (!mesh) return;
   // A changed unit applies to the object that is already placed.
   mesh.name = again && placed ? placed : mesh.name;
@@ -73,7 +69,7 @@ async function add(again) {
 function place(mesh, scale) {
   placed = mesh.name;
   window.dispatchEvent(new Event("placed"));
-  say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key, ...(where && { near: where }), ...(scale && { scale }) });
+  page.say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key, ...(where && { near: where }), ...(scale && { scale }) });
 }
 
 /** Offer the files of a .zip file, one of which is to be read. @param {string[]} choices */
@@ -90,22 +86,22 @@ function offer(choices) {
 /** @param {File} scene */
 async function load(scene) {
   report(`Reading ${scene.name} …`);
-  const answer = await ask("scene", scene);
+  const answer = await (await ask("scene", scene))?.json();
   if (!answer) return;
-  say({ do: "load", scene: answer.key });
+  page.say({ do: "load", scene: answer.key });
   report(answer.text);
 }
 
 async function saveScene() {
-  const answer = await fetch(`${API}scene`).catch(() => null);
-  if (!answer?.ok) return report(answer ? (await answer.json()).why : UNREACHABLE, true);
+  const answer = await ask("scene");
+  if (!answer) return;
   save(await answer.blob(), "scene.zip");
   report("Saved. scene.zip contains scene.yaml and the files of its objects.");
 }
 
-/** @param {Pick<Page.Context, "say">} page */
-export function begin(page) {
-  say = page.say;
+/** @param {Page.Context} context */
+export function begin(context) {
+  page = context;
   byId("add").addEventListener("click", () => byId("object-file").click());
   byId("load").addEventListener("click", () => byId("scene-file").click());
   byId("save").addEventListener("click", saveScene);
@@ -120,10 +116,8 @@ let form = null; // of the chosen object
 /** Note that the sheet is shown, or hidden. @param {boolean} shown */
 export async function show(shown) {
   if (!shown && !form) return;
-  form ??= import("./objects/object.js").then(({ ObjectForm }) => new ObjectForm(say));
-  const chosen = await form;
-  if (!chosen.element.isConnected) byId("objects").append(chosen.element);
-  chosen.watch(!byId("objects").hidden);
+  form ??= import("./objects/object.js").then(({ ObjectForm }) => new ObjectForm(page));
+  (await form).watch(!byId("objects").hidden);
 }
 
 // Read files that were chosen or dropped, each of which is an object, or a scene or a robot in a .zip file. `at` is the

@@ -6,14 +6,15 @@ export const queryOf = (values) => new URLSearchParams(Object.entries(values).ma
 /** Return the words of an error. @param {unknown} error */
 export const messageOf = (error) => (error instanceof Error ? error.message : String(error));
 
-// Return the response to a request. Throws an error with the reason for a refusal, or without an answer.
+// Return the response to a request. Throws an error with the reason for a refusal and its `choices`, or without an answer.
 /** @param {string} url @param {RequestInit} [options] */
 export async function request(url, options) {
   const answer = await fetch(url, options).catch(() => null);
   if (!answer) throw new Error("The server does not answer.");
   if (answer.ok) return answer;
   const words = await answer.text();
-  throw new Error(words.startsWith("{") ? JSON.parse(words).why : words);
+  const { why, choices } = words.startsWith("{") ? JSON.parse(words) : { why: words };
+  throw Object.assign(new Error(why), { choices });
 }
 
 /** Return the answer `arm`. Throws an error without one. @returns {Promise<Api.Arm>} */

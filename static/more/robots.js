@@ -1,7 +1,7 @@
 // The choice of another robot. Loaded on first use.
 import { element, onChoice, styled } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
-import { messageOf, request } from "../server.js";
+import { messageOf, queryOf, request } from "../server.js";
 
 /** @typedef {{ name: string, title: string, kind: "included" | "first" | "uploaded" | "gallery" | "other", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
 
@@ -95,18 +95,15 @@ async function load() {
 async function upload(file, main = "", isDropped = false) {
   report(`${file.name} is being sent…`);
   try {
-    const answer = await fetch(`${PATH}?${new URLSearchParams({ name: file.name, main })}`, { method: "POST", body: file });
-    const { robot, why, choices } = await answer.json();
-    if (choices) {
-      report(why);
-      return list.replaceChildren(...choices.map((/** @type {string} */ path) => button(path, () => upload(file, path, isDropped))));
-    }
-    if (!answer.ok) return report(why);
+    const answer = await request(`${PATH}?${queryOf({ name: file.name, main })}`, { method: "POST", body: file });
+    const { robot } = await answer.json();
     report("");
     await load();
     ask(robot, isDropped);
   } catch (error) {
-    report(`${file.name} was not sent: ${messageOf(error)}`);
+    report(messageOf(error));
+    const { choices } = /** @type {{ choices?: string[] }} */ (error);
+    if (choices) list.replaceChildren(...choices.map((path) => button(path, () => upload(file, path, isDropped))));
   }
 }
 
