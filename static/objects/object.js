@@ -1,6 +1,7 @@
-// The chosen object in the sheet of objects: its looks, size and rotation, what carries it, and the rule for the arm in a zone.
-import { onClick, repeating, styled, write } from "../dom.js";
+// The chosen object in the sheet of objects: its looks, size and place, what carries it, and the rule for the arm in a zone.
+import { byId, onClick, repeating, styled, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
+import { mayDrive } from "../page/lease.js";
 import { readObjects } from "../server.js";
 
 const EVERY = 1000; // ms between two looks at the objects, which others change too
@@ -23,6 +24,9 @@ const NEW_PLANE = /** @type {Partial<Api.Place>} */ ({ shape: "plane", size: [0.
 /** What the numbers of a size are, of shapes other than boxes. @type {Record<string, string>} */
 const SIZES = { sphere: "Radius, mm", cylinder: "Radius × height, mm", vessel: "Radius × height, mm" };
 
+const PLACING = "#objects :is(#add, #add-box, #add-zone, #add-plane, #unit, #load)"; // what needs the arm, beside the chosen object
+const NUMBER = { type: "number", step: "any" };
+
 /** Return the pose `T` turned by `angle` [degrees] about the vertical through it. @param {number[][]} T @param {number} angle */
 function turned(T, angle) {
   const [c, s] = [Math.cos(angle / DEGREES), Math.sin(angle / DEGREES)];
@@ -31,7 +35,7 @@ function turned(T, angle) {
 }
 
 export class ObjectForm {
-  #say;
+  #page; // {say, store, toast}
   /** @type {Api.SceneObject[]} */
   #objects = [];
   #sender = 0;
@@ -39,27 +43,30 @@ export class ObjectForm {
   #acted = -Infinity; // ms, time of the last change
   #choice = html("select", { "aria-label": "Object" });
   #remove = button("Remove", () => this.#act({ do: "remove", name: this.#name }));
-  #colour = this.#input("colour", { type: "color" }, (value) => ({ colour: value }));
-  #own = button("Own colour", () => this.#act({ do: "place", name: this.#name, colour: "own" }));
-  #opacity = this.#input("opacity", { type: "range", min: 5, max: 100, step: 1 }, (value) => ({ opacity: Number(value) / 100 }));
-  #scale = this.#input("scale", { type: "number", min: 0.001, max: 1000, step: "any", inputmode: "decimal" }, (value) => (value ? { scale: Number(value) } : {}));
-  #size = this.#input("size", { type: "text" }, (value) => ({ size: this.#sizeOf(value) }));
+  #colour = this.#input("Colour", { type: "color" }, (value) => ({ colour: value }));
+  #opacity = this.#input("Opacity", { type: "range", min: 5, max: 100, step: 1 }, (value) => ({ opacity: Number(value) / 100 }));
+  #scale = this.#input("Scale", NUMBER, (value) => ({ scale: Number(value || NaN) }));
+  #size = this.#input("Size", { type: "text" }, (value) => ({ size: this.#sizeOf(value) }));
+  #place = ["x", "y", "z"].map((name, row) => this.#input(name, { ...NUMBER, "aria-label": name }, (value) => this.#moved(row, Number(value || NaN) / 1e3)));
   #sizeLabel = html("span");
   #zone = html("select", {}, ...ZONES.map(([label, zone]) => new Option(label, zone)));
-  #turn = this.#input("turn", { type: "range", min: -180, max: 180, step: 1 }, (value) => this.#turned(Number(value)));
-  #hidden = html("input", { type: "checkbox" });
-  #values = { opacity: html("output"), turn: html("output") };
+  #turn = this.#input("Turn", { type: "range", min: -180, max: 180, step: 1, "aria-label": "Turn" }, (value) => this.#turned(Number(value)));
+  #angle = this.#input("Turn", { ...NUMBER, "aria-label": "Turn, °" }, (value) => this.#turned(Number(value || NaN)));
+  #hidden = this.#input("Hidden", { type: "checkbox" }, () => ({ hidden: this.#hidden.checked }));
+  #percent = html("output");
   #why = html("p", { role: "status" });
+  #refusal = html("p", { class: "refusal", role: "status" }); // why nothing can be changed here
+  #mounts = MOUNTS.map(([label, to, title]) => button(label, () => this.#act({ do: "attach", name: this.#name, to }), { title }));
   element = html("fieldset", { id: "object", "aria-label": "Chosen object" });
 
-  /** @param {Page.Say} say */
-  constructor(say) {
-    this.#say = say;
+  /** @param {Pick<Page.Context, "say" | "store" | "toast">} page */
+  constructor(page) {
+    this.#page = page;
     styled("object.css", import.meta.url);
+    byId("objects").prepend(this.#refusal);
+    byId("which").after(this.element);
     /** @param {string} name @param {(Node | string)[]} content */
     const row = (name, ...content) => html("label", {}, html("span", {}, name), ...content);
-    const mounts = MOUNTS.map(([label, to, title]) => button(label, () => this.#act({ do: "attach", name: this.#name, to }), { title }));
-    this.#hidden.addEventListener("change", () => this.#act({ do: "place", name: this.#name, hidden: this.#hidden.checked }));
     this.#choice.addEventListener("change", () => this.#show(true));
     this.#zone.addEventListener("change", () => this.#act({ do: "place", name: this.#name, zone: /** @type {Api.Zone} */ (this.#zone.value) }));
     onClick("add-box", () => this.#add("box", NEW_BOX));
@@ -69,15 +76,17 @@ export class ObjectForm {
       // What is in the legend stays in use while the rest is not.
       html("legend", {}, this.#choice, this.#remove),
       this.#why,
-      html("div", {}, row("Colour", this.#colour), this.#own),
-      row("Opacity", this.#opacity, this.#values.opacity),
+      html("div", { role: "group", "aria-label": "Position" }, html("span", {}, "x, y, z, mm"), ...this.#place),
+      html("div", {}, html("span", {}, "Turn, °"), this.#turn, this.#angle),
+      html("div", {}, row("Colour", this.#colour), button("Own colour", () => this.#act({ do: "place", name: this.#name, colour: "own" }))),
+      row("Opacity", this.#opacity, this.#percent),
       html("label", {}, this.#sizeLabel, this.#size),
       row("Scale", this.#scale),
-      row("Turn", this.#turn, this.#values.turn),
       row("Zone", this.#zone),
       row("Hidden", this.#hidden, html("small", {}, "not drawn; the arm still keeps clear of it")),
-      html("div", { role: "group", "aria-label": "Attach to" }, html("span", {}, "Attach to"), ...mounts),
+      html("div", { role: "group", "aria-label": "Attach to" }, html("span", {}, "Attach to"), ...this.#mounts),
     );
+    page.store.follow(() => this.#permit());
     window.addEventListener("selected", (event) => {
       const name = /** @type {CustomEvent<string>} */ (event).detail;
       if (!this.#objects.some((object) => object.name === name)) return;
@@ -97,13 +106,18 @@ export class ObjectForm {
   // A control that changes the object when it is used.
   /** @param {string} name @param {import("../instruments/shape.js").Attributes} attributes @param {(value: string) => Partial<Api.Place>} change */
   #input(name, attributes, change) {
+    const isTyped = attributes.type === "text" || attributes.type === "number";
     const input = html("input", { name, ...attributes });
     const send = () => {
       this.#sender = 0;
-      this.#act({ do: "place", name: this.#name, ...change(input.value) });
+      const fields = change(input.value);
+      if (!Object.values(fields).flat(2).some(Number.isNaN)) return this.#act({ do: "place", name: this.#name, ...fields });
+      this.#page.toast(`${name}: ${input.value || "nothing"} is not a number. It was not sent.`);
+      this.#show(true);
     };
-    input.addEventListener(input.type === "number" || input.type === "text" ? "change" : "input", () => {
-      this.#write();
+    input.addEventListener(isTyped ? "change" : "input", () => {
+      input.defaultValue = input.value;
+      this.#percent.value = `${this.#opacity.value} %`;
       if (!this.#sender) this.#sender = setTimeout(send, SEND_EVERY);
     });
     return input;
@@ -122,6 +136,11 @@ export class ObjectForm {
     this.#act({ do: "place", name: `${word} ${number}`, zone: "keep_out", ...fields });
   }
 
+  /** @param {number} axis @param {number} value of this coordinate [m] @returns {Partial<Api.Place>} */
+  #moved(axis, value) {
+    return { T: this.#object?.T.map((row, i) => (i === axis ? [...row.slice(0, 3), value] : row)) };
+  }
+
   /** @param {number} angle @returns {Partial<Api.Place>} */
   #turned(angle) {
     const T = this.#object?.T;
@@ -130,7 +149,7 @@ export class ObjectForm {
 
   /** @param {Api.Act} request */
   #act(request) {
-    this.#say(request);
+    this.#page.say(request);
     this.#acted = performance.now();
     setTimeout(() => this.#read(), HELD);
   }
@@ -150,31 +169,42 @@ export class ObjectForm {
     this.#show(this.#name !== before.find(({ name }) => name === this.#name)?.name);
   }
 
-  // Show the chosen object; one that a person is changing only with `again`.
+  // Let the person change objects, or say why not.
+  #permit() {
+    const { live } = this.#page.store;
+    const may = mayDrive(live);
+    for (const control of document.querySelectorAll(PLACING)) control.toggleAttribute("disabled", !may);
+    write(this.#refusal, may ? "" : live ? `${live.holder} drives. Request the arm at the top to change objects.` : "No connection to the arm.");
+    this.element.disabled = this.#remove.disabled = !may || Boolean(this.#object?.held);
+  }
+
+  // Show the chosen object; what a person is changing only with `again`.
   #show(again = false) {
     const object = this.#object;
     this.element.hidden = !this.#objects.length;
     this.element.classList.toggle("none", !object);
+    this.#permit();
     if (again) window.dispatchEvent(new CustomEvent("chosen", { detail: this.#name }));
     if (!object || (!again && (this.#sender || performance.now() - this.#acted < HELD || this.element.matches(":active")))) return;
-    const { colour, opacity, size, scale, hidden, T, held, zone } = object;
+    const { colour, opacity, size, scale, hidden, T, held, fixed, zone } = object;
+    /** A typed text that is not sent yet stays. @param {HTMLInputElement} input @param {string | number} text */
+    const fill = (input, text) => {
+      if (again || input.value === input.defaultValue) input.defaultValue = input.value = String(text);
+    };
+    const angle = Math.atan2(T[1][0], T[0][0]) * DEGREES;
     this.#colour.value = colour ?? PLAIN;
     this.#opacity.value = String(Math.round(100 * opacity));
-    if (this.#scale !== document.activeElement || again) this.#scale.value = String(scale);
-    const sides = size.map((side) => Number((1e3 * scale * side).toPrecision(6)));
-    if (this.#size !== document.activeElement || again) this.#size.value = sides.join(" × ");
+    this.#percent.value = `${this.#opacity.value} %`;
+    fill(this.#scale, scale);
+    fill(this.#size, size.map((side) => Number((1e3 * scale * side).toPrecision(6))).join(" × "));
+    this.#place.forEach((input, row) => fill(input, Number((1e3 * T[row][3]).toFixed(2)) + 0));
+    fill(this.#angle, Number(angle.toFixed(2)) + 0);
     write(this.#sizeLabel, SIZES[object.shape] ?? "Size, mm");
     this.#size.readOnly = object.shape === "mesh";
     this.#zone.value = zone ?? "none";
-    this.#turn.value = String(Math.round(Math.atan2(T[1][0], T[0][0]) * DEGREES) + 0);
+    this.#turn.value = String(Math.round(angle));
     this.#hidden.checked = hidden;
-    this.element.disabled = this.#remove.disabled = held;
-    write(this.#why, held ? "It is held: open the gripper first" : "");
-    this.#write();
-  }
-
-  #write() {
-    this.#values.opacity.value = `${this.#opacity.value} %`;
-    this.#values.turn.value = `${this.#turn.value}°`;
+    this.#mounts.forEach((mount, i) => (mount.ariaPressed = String(fixed === (i === 0))));
+    write(this.#why, held ? "It is held: open the gripper first" : fixed ? "It is attached to the hand and moves with it." : "");
   }
 }

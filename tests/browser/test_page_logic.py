@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import TaughtPose, taught
 from katana450.extensions.recording.files.spans import Span, at_place
-from tests.browser.bare_page import bare_page, load, module
+from tests.browser.bare_page import ORIGIN, bare_page, load, module
 
 
 @pytest.fixture
@@ -104,6 +104,92 @@ def test_value_that_came_late_is_sent_again_while_the_hand_holds_the_knob(page: 
             return [acts, knob.dial.ariaValueNow];
         }"""
     ) == [[[90, 7], [90, 7]], "0.00"]
+
+
+# Objects
+
+BOX = {
+    **{"name": "box 1", "shape": "box", "size": [0.03, 0.03, 0.05], "scale": 1.0, "opacity": 1.0},
+    "T": [[1.0, 0.0, 0.0, 0.3], [0.0, 1.0, 0.0, 0.1], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]],
+    **{"hidden": False, "held": False, "fixed": True, "zone": "none"},
+}
+
+
+def test_place_of_an_object_is_typed_by_who_drives(page: Page) -> None:
+    page.route("**/api/v1/objects", lambda route: route.fulfill(json={"objects": [BOX]}))
+    load(page, "Sheet", "objects/object.js")
+    page.evaluate(
+        """() => {
+            const live = { role: "operator", mine: true, own_program: false, holder: "Ada" };
+            const store = { live, follow: (act) => (window.follow = act) };
+            const [say, toast] = [(request) => said.push(request), (words) => told.push(words)];
+            Object.assign(window, { said: [], told: [], live });
+            new Sheet.ObjectForm({ store, say, toast }).watch(true);
+            document.getElementById("objects").hidden = false;
+        }"""
+    )
+    form = page.locator("#object")
+    x = form.get_by_label("x", exact=True)
+    expect(x).to_have_value("300")
+    expect(form.get_by_role("button", name="Hand", pressed=True)).to_be_visible()
+    expect(form).to_contain_text("attached to the hand")
+    x.fill("412.5")
+    x.press("Enter")
+    page.wait_for_function("said.length === 1")
+    assert page.evaluate("said[0].T.map((row) => row[3])") == [0.4125, 0.1, 0.0, 1.0]
+    # The server has refused it, as the next reading shows.
+    expect(x).to_have_value("300")
+    x.fill("")
+    x.press("Enter")
+    page.wait_for_function("told.length === 1")
+    assert page.evaluate("told") == ["x: nothing is not a number. It was not sent."]
+    assert page.evaluate("said.length") == 1
+    turns, names = [0.0, 1.0, 0.0], ["Turn, °", "Colour", "Opacity"]
+    for count, (name, value) in enumerate(zip(names, ("90", "#ff8800", "40"), strict=True), 2):
+        form.get_by_label(name).fill(value)
+        form.get_by_label(name).press("Enter")
+        page.wait_for_function(f"said.length === {count}")
+    assert page.evaluate("said[1].T.slice(0, 3).map((row) => row[0])") == pytest.approx(turns)
+    assert page.evaluate("[said[2].colour, said[3].opacity]") == ["#ff8800", 0.4]
+    # Another person drives.
+    page.evaluate("live.mine = false, follow()")
+    refusal = page.locator("#objects .refusal")
+    assert refusal.inner_text() == "Ada drives. Request the arm at the top to change objects."
+    assert page.locator("#add-box").is_disabled()
+    assert x.is_disabled()
+    page.evaluate("live.mine = true, follow()")
+    assert page.locator("#add-box").is_enabled()
+    assert not refusal.is_visible()
+
+
+# First steps
+
+
+def test_refused_first_step_says_what_to_do_only_until_it_is_done(browser: Browser) -> None:
+    arm = {"default_tool": "tcp", "gripper": [0.0, 1.0], "tools": {"grasp": {}}}
+    with bare_page(browser, arm=arm) as page:
+        page.route("**/api/v1/scripts/Pour", lambda route: route.fulfill(body="steps: []"))
+        page.evaluate(
+            """async (path) => {
+                const status = { scripts: true, orders: [], paused: true, stopped: null };
+                const store = { status, follow: (act) => (window.follow = act) };
+                const say = ({ id }) => setTimeout(() => window.card.hear(
+                    { is: "refused", id, why: "paused: press Resume to continue" }));
+                const kept = { getItem: () => null, setItem() {} };
+                const { Welcome } = await import(path);
+                window.card = await Welcome.on({ store, say, kept, toast() {} });
+                window.shown = status;
+            }""",
+            f"{ORIGIN}/static/welcome/welcome.js",
+        )
+        says = page.locator("#welcome > p")
+        expect(says).to_contain_text("in any order")
+        page.locator("#welcome button", has_text="pour").click()
+        expect(says).to_contain_text("press Resume")
+        page.evaluate("follow(shown)")
+        expect(says).to_contain_text("press Resume")
+        page.evaluate("follow({ ...shown, paused: false })")
+        expect(says).to_be_empty()
 
 
 # Pause and Speed
