@@ -1,5 +1,5 @@
 // The first steps: a card over the scene with three things to try, each with one click.
-import { element, sceneOf, write } from "../dom.js";
+import { element, repeating, sceneOf, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { armWithStyle } from "../page/ready.js";
 import { messageOf, readState, request } from "../server.js";
@@ -20,11 +20,11 @@ const HANDLE = "/target/move";
 export class Welcome {
   #page;
   #card = html("section", { id: "welcome", class: "sheet", "aria-label": "First steps" });
-  #says = html("p", { role: "status" });
+  #says = html("p", { role: "status" }, "Try them in any order. STOP, at the top left, works at any time.");
+  #blocked = false; // whether a pause or a stop keeps the program from running
   #pulse = html("i", { id: "pulse", hidden: "" });
   #arm;
-  /** @type {number | null} */
-  #dragging = null; // timer, while the handle pulses
+  #watch = repeating(() => this.#place(), PULSE_EVERY);
   /** @type {typeof POUR | null} */
   #program = null; // what the program of the card is, of an arm that can do it
   #run; // of the program
@@ -86,10 +86,7 @@ export class Welcome {
 
   #drag() {
     write(this.#says, "Drag one of the pulsing arrows in the scene.");
-    this.#pulse.hidden = false;
-    clearInterval(this.#dragging ?? undefined);
-    this.#dragging = setInterval(() => this.#place(), PULSE_EVERY);
-    this.#place();
+    this.#watch(true);
   }
 
   // Put the ring where the camera shows the handle.
@@ -103,19 +100,23 @@ export class Welcome {
   }
 
   #still() {
-    clearInterval(this.#dragging ?? undefined);
-    this.#dragging = null;
+    this.#blocked = false;
+    this.#watch(false);
     this.#pulse.hidden = true;
   }
 
   /** A drag is the newest change that this person can undo, or was asked for and moves the arm. @param {Page.Status} status */
   #note(status) {
+    if (this.#blocked && !status.paused && !status.stopped) {
+      this.#blocked = false;
+      write(this.#says, "");
+    }
     // The program runs, also after a reload or a stop, for its owner, who alone may end it.
     const runs = status.orders.includes("end") && !status.planning;
     if (runs && status.continues[0] === this.#program?.name) this.#play(true);
     const wanted = this.#arm.default_tool ? "arm (drag)" : "arm (";
     const isDrag = status.mine && (status.undo?.[0] ?? "").startsWith(wanted);
-    const moves = this.#dragging !== null && status.mine && status.mood === "moving";
+    const moves = !this.#pulse.hidden && status.mine && status.mood === "moving";
     if (this.#steps.drag.button.classList.contains("done") || !(isDrag || moves)) return;
     this.#still();
     this.#done("drag");
@@ -131,11 +132,13 @@ export class Welcome {
     try {
       const { revocations } = this.#page.store.status ?? {};
       const program = began ? await this.#run.follow() : await this.#run.play(await this.#script(), "run", revocations);
-      const worked = program.status === "done";
-      if (worked) this.#done(name);
-      write(this.#says, worked ? did : `${not} ${program.why || program.status}`);
+      if (program.status !== "done") throw new Error(program.why || program.status);
+      this.#done(name);
+      write(this.#says, did);
     } catch (error) {
       write(this.#says, `${not} ${messageOf(error)}`);
+      const { paused, stopped } = this.#page.store.status ?? {};
+      this.#blocked = Boolean(paused || stopped);
     }
   }
 
