@@ -210,7 +210,7 @@ export function press(label, value) {
 
 /** Show a node in this page, or show it as the server does. @param {string} name @param {boolean} [visible] */
 export function reveal(name, visible = shown.get(name) ?? false) {
-  page?.dispatchEvent(batchOf([{ type: "SetSceneNodeVisibilityMessage", name, visible }]));
+  page?.dispatchEvent(batchOf([{ type: "SetSceneNodeVisibilityMessage", name, visible: visible && !hidden?.(name) }]));
 }
 
 // Hide the nodes for whose names `hides` returns true in this page alone; null shows them as the server does.

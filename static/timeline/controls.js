@@ -12,29 +12,23 @@ const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.
 /** @param {keyof typeof ICONS} name */
 const icon = (name) => drawing("0 0 20 20", svg("path", { d: ICONS[name] }));
 
-/** @param {string | number} value @param {string} words */
-export const option = (value, words) => html("option", { value }, words);
-
 /** @param {string} name @param {string} label */
 const range = (name, label) => html("input", { type: "range", class: name, min: "0", max: "1", step: "any", "aria-label": label });
 
 /** @param {string} label @param {() => void} act @param {(Node | string)[]} content */
 const titled = (label, act, ...content) => button(content.length ? content : label, act, { title: label, "aria-label": label });
 
-/**
- * What the buttons do.
- * @typedef {Record<"play" | "again" | "live" | "restore" | "fold" | "save" | "verify", () => void>} Acts
- */
+/** What the buttons do. @typedef {Record<"play" | "again" | "live" | "restore" | "fold" | "save" | "verify", () => void>} Acts */
 
 export class Controls {
   work = html("div", { class: "work", hidden: "" });
-  exports = html("select", { "aria-label": "Export the selection" }, option("", "Export…"), ...EXPORTS.map(([name, words]) => option(name, words)));
+  exports = html("select", { "aria-label": "Export the selection" }, new Option("Export…", ""), ...EXPORTS.map(([name, words]) => new Option(words, name)));
   clock = html("output", { class: "clock" }, "Live");
   marks = html("div", { class: "marks" });
   begin = range("end", "Start of the selection");
   end = range("end", "End of the selection");
   now = range("now", "Moment that is shown");
-  speed = html("select", { "aria-label": "Speed of playing back" }, ...SPEEDS.map((speed) => option(speed, `${speed}×`)));
+  speed = html("select", { "aria-label": "Speed of playing back" }, ...SPEEDS.map((speed) => new Option(`${speed}×`, String(speed))));
   of = html("select", { "aria-label": "Recording" });
   second = html("select", { "aria-label": "Second run" });
   events = html("select", { "aria-label": "Events" });

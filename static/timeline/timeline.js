@@ -1,11 +1,11 @@
 // The timeline: what the server has recorded, or a file, shown in this window alone at any moment.
-import { element, onChoice, sceneOf, styled, write } from "../dom.js";
+import { element, onChoice, onPick, sceneOf, styled, write } from "../dom.js";
 import { html } from "../instruments/shape.js";
 import { addressed } from "../page/words.js";
 import { messageOf } from "../server.js";
 import * as api from "./api.js";
 import { atPlace, bars, lengthOf, placeOf } from "./axis.js";
-import { Controls, option, timeInWords } from "./controls.js";
+import { Controls, timeInWords } from "./controls.js";
 import { NOTHING, Selection } from "./selection.js";
 
 /** @typedef {{ of: string, begin: number, spans: api.Span[], mine: number }} SecondRun */
@@ -148,15 +148,8 @@ export class Timeline {
 
   #listen() {
     const { now, begin, end, of, second, events, exports, file } = this.#part;
-    exports.addEventListener("change", () => {
-      const words = exports.selectedOptions[0].text;
-      this.#selection.process(this.#selected(), exports.value, `Export as ${words}`);
-      exports.value = "";
-    });
-    events.addEventListener("change", () => {
-      this.#seek(Number(events.value));
-      events.value = "";
-    });
+    onPick(exports, (what) => this.#selection.process(this.#selected(), what, `Export as ${exports.selectedOptions[0].text}`));
+    onPick(events, (t) => this.#seek(Number(t)));
     now.addEventListener("input", () => this.#seek(atPlace(this.#spans, Number(now.value))));
     now.addEventListener("keydown", (event) => this.#key(event));
     begin.addEventListener("input", () => this.#select(0, Number(begin.value)));
@@ -240,11 +233,11 @@ export class Timeline {
   #list() {
     const { of, second } = this.#part;
     const may = this.#page.store.status?.role !== "viewer";
-    const opened = () => [...this.#names].filter(([name]) => name !== api.RING).map(([name, words]) => option(name, words));
-    const file = may ? [option("file", "Open a file…")] : [];
-    of.replaceChildren(option(api.RING, this.#names.get(api.RING) ?? ""), ...opened(), ...file);
+    const opened = () => [...this.#names].filter(([name]) => name !== api.RING).map(([name, words]) => new Option(words, name));
+    const file = may ? [new Option("Open a file…", "file")] : [];
+    of.replaceChildren(new Option(this.#names.get(api.RING), api.RING), ...opened(), ...file);
     of.value = this.#of;
-    second.replaceChildren(option("", "Compare…"), option("here", "from here on"), ...opened());
+    second.replaceChildren(new Option("Compare…", ""), new Option("from here on", "here"), ...opened());
     second.value = this.#second ? (this.#names.has(this.#second.of) && this.#second.of !== this.#of ? this.#second.of : "here") : "";
   }
 
@@ -367,6 +360,6 @@ export class Timeline {
     for (const entry of legend.children) entry.toggleAttribute("hidden", !this.#marks.some(([, kind]) => kind === entry.getAttribute("data-kind")));
     // An open list keeps its place.
     if (document.activeElement === events && events.options.length === this.#marks.length + 1) return;
-    events.replaceChildren(option("", "Events"), ...this.#marks.toReversed().map(([t, , words]) => option(t, `${timeInWords(t)} ${words}`)));
+    events.replaceChildren(new Option("Events", ""), ...this.#marks.toReversed().map(([t, , words]) => new Option(`${timeInWords(t)} ${words}`, String(t))));
   }
 }

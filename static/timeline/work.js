@@ -81,8 +81,6 @@ export class Work {
     this.#begun = null;
     this.#box.hidden = true;
     if (!begun) return;
-    /** @param {{ job: string }} begun */
-    const cancel = ({ job }) => answered(`${JOBS}/${job}/cancel`, { method: "POST" });
-    this.#closed = begun.then(cancel).catch(() => {});
+    this.#closed = begun.then(({ job }) => answered(`${JOBS}/${job}/cancel`, { method: "POST" })).catch(() => {});
   }
 }
