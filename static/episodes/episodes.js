@@ -198,6 +198,7 @@ export class Episodes {
     const summary = html("summary", { "data-key": number }, html("b", {}, `${number}`), html("span", {}, length), html("i", { class: outcome }, OUTCOMES[outcome]), html("span", {}, task));
     const row = html("details", this.#open.has(number) ? { open: "" } : {}, summary);
     row.addEventListener("toggle", () => this.#open[row.open ? "add" : "delete"](number));
+    row.addEventListener("toggle", () => row.contains(document.activeElement) && row.scrollIntoView({ block: "nearest" }));
     if (!this.#may) return html("li", {}, row);
     /** @param {string} label @param {Record<string, string | number>} attributes @param {(value: string) => void} change */
     const field = (label, attributes, change) => {
