@@ -201,6 +201,7 @@ def test_zone_is_added_in_the_sheet(page: ViserPage, reader: Client, artefacts: 
     page.wait_until(lambda: objects(reader)["zone 1"].size == [0.02, 0.4005, 0.5], "the size")
     form.get_by_label("Zone").select_option("The arm is slow")
     page.wait_until(lambda: objects(reader)["zone 1"].zone == "slow", "the rule")
+    page.wait_until(lambda: size.input_value() == "20 × 400.5 × 500", "the size as it is shown")
     page.keep(artefacts / "zone.png")
     size.fill("200 200 200")
     size.press("Enter")
@@ -216,6 +217,7 @@ def test_zone_is_added_in_the_sheet(page: ViserPage, reader: Client, artefacts: 
     page.page.mouse.click(*page.project(np.array((0.3, 0.45, 0.5))))
     page.wait_until(lambda: page.page.inner_text("#selection b") == "plane 1", "the plane")
     page.wait_ready(("/handles/plane%201/turn",))
+    page.wait_until(lambda: form.get_by_label("Object").input_value() == "plane 1", "its row")
     page.page.mouse.click(*page.project(np.array((0.36, 0.0, 0.05))))
     page.wait_ready(("/handles/zone%201/size",))
     with page.grip_arrow("/handles/zone%201/size", "x") as grip:
