@@ -6,8 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Browser, expect
 
+from tests.browser.bare_page import ORIGIN, bare_page
 from tests.browser.camera import Drawing
 from tests.browser.conftest import OpenPage
 from tests.browser.page import FIRST_VISIT, ViserPage
@@ -103,6 +104,33 @@ def test_other_arm_is_offered_what_it_can_do(open_page: OpenPage, tmp_path: Path
         press(page, "Watch it move")
         page.wait_until(lambda: done(page, "Watch it move"), "the end", seconds=60.0)
         assert page.errors == []
+
+
+def test_refused_first_step_says_what_to_do_only_until_it_is_done(browser: Browser) -> None:
+    arm = {"default_tool": "tcp", "gripper": [0.0, 1.0], "tools": {"grasp": {}}}
+    with bare_page(browser, arm=arm) as page:
+        page.route("**/api/v1/scripts/Pour", lambda route: route.fulfill(body="steps: []"))
+        page.evaluate(
+            """async (path) => {
+                const status = { scripts: true, orders: [], paused: true, stopped: null };
+                const store = { status, follow: (act) => (window.follow = act) };
+                const say = ({ id }) => setTimeout(() => window.card.hear(
+                    { is: "refused", id, why: "paused: press Resume to continue" }));
+                const kept = { getItem: () => null, setItem() {} };
+                const { Welcome } = await import(path);
+                window.card = await Welcome.on({ store, say, kept, toast() {} });
+                window.shown = status;
+            }""",
+            f"{ORIGIN}/static/welcome/welcome.js",
+        )
+        says = page.locator("#welcome > p")
+        expect(says).to_contain_text("in any order")
+        page.locator("#welcome button", has_text="pour").click()
+        expect(says).to_contain_text("press Resume")
+        page.evaluate("follow(shown)")
+        expect(says).to_contain_text("press Resume")
+        page.evaluate("follow({ ...shown, paused: false })")
+        expect(says).to_be_empty()
 
 
 @pytest.mark.long

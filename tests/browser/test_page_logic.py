@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import TaughtPose, taught
 from katana450.extensions.recording.files.spans import Span, at_place
-from tests.browser.bare_page import ORIGIN, bare_page, load, module
+from tests.browser.bare_page import bare_page, load, module
 
 
 @pytest.fixture
@@ -160,36 +160,6 @@ def test_place_of_an_object_is_typed_by_who_drives(page: Page) -> None:
     page.evaluate("live.mine = true, follow()")
     assert page.locator("#add-box").is_enabled()
     assert not refusal.is_visible()
-
-
-# First steps
-
-
-def test_refused_first_step_says_what_to_do_only_until_it_is_done(browser: Browser) -> None:
-    arm = {"default_tool": "tcp", "gripper": [0.0, 1.0], "tools": {"grasp": {}}}
-    with bare_page(browser, arm=arm) as page:
-        page.route("**/api/v1/scripts/Pour", lambda route: route.fulfill(body="steps: []"))
-        page.evaluate(
-            """async (path) => {
-                const status = { scripts: true, orders: [], paused: true, stopped: null };
-                const store = { status, follow: (act) => (window.follow = act) };
-                const say = ({ id }) => setTimeout(() => window.card.hear(
-                    { is: "refused", id, why: "paused: press Resume to continue" }));
-                const kept = { getItem: () => null, setItem() {} };
-                const { Welcome } = await import(path);
-                window.card = await Welcome.on({ store, say, kept, toast() {} });
-                window.shown = status;
-            }""",
-            f"{ORIGIN}/static/welcome/welcome.js",
-        )
-        says = page.locator("#welcome > p")
-        expect(says).to_contain_text("in any order")
-        page.locator("#welcome button", has_text="pour").click()
-        expect(says).to_contain_text("press Resume")
-        page.evaluate("follow(shown)")
-        expect(says).to_contain_text("press Resume")
-        page.evaluate("follow({ ...shown, paused: false })")
-        expect(says).to_be_empty()
 
 
 # Pause and Speed
