@@ -113,6 +113,15 @@ def test_full_cup_returns_straight_or_not_at_all(
     first_tick = next(tick for tick in course if tick[0].number >= lifted and tick[1].following)
     run, state = stop(stage, pour, *first_tick)
     interruption = interruption_of(pour, run, state)
+    # Held by friction, the cup slips while the arm brakes, and keeps slipping.
+    slip = np.zeros((4, 4))
+    slip[2, 3] = 5e-5
+    for name, changed in (("cup", False), ("basin", True)):
+        objects = (
+            replace(body, T=body.T + slip) if body.name == name else body for body in state.objects
+        )
+        slipped = replace(state, objects=tuple(objects))
+        assert bool(interruption.changed_to(slipped)) == changed
     aside = rested(stage.session, state, cmd.Joints(state.setpoint + np.array([0.4, 0, 0, 0, 0])))
     rest = continued(interruption, stage.plan_context, aside)
     assert any(task.name == RETURN for task in rest.tasks)

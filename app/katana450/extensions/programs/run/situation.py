@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,10 @@ from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
 from katana450.maths.geometry.arrays import FloatArray
 
-Scene = tuple[tuple[object, ...], ...]
+MAX_SLIP = 1e-3
+"""[m or 1] Change of a pose in the hand, in which friction lets objects slip, that keeps plans."""
+
+Scene = tuple[tuple[Any, ...], ...]
 """Shape and pose of every object; a plan does not depend on their appearance."""
 
 
@@ -61,7 +65,8 @@ class Situation:
             return "the gripper has moved"
         if self.tool != now.tool:
             return "another tool frame is chosen"
-        if self.scene != now.scene:
+        same = len(self.scene) == len(now.scene) and all(map(_is_same, self.scene, now.scene))
+        if not same:
             return "the scene has changed"
         return "" if self.water == now.water else "the water has changed"
 
@@ -70,7 +75,13 @@ def _shape(scene_object: SceneObject) -> tuple[object, ...]:
     solid = None if scene_object.solid is None else scene_object.solid.key
     T = scene_object.T.tobytes()
     return (
-        scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, solid, T,
-        scene_object.held, scene_object.fixed, scene_object.can_be_held,
-        scene_object.zone,
+        scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, solid,
+        scene_object.fixed, scene_object.can_be_held, scene_object.zone,
+        scene_object.held, T,
     )  # fmt: skip
+
+
+def _is_same(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
+    """Return whether an object is unchanged, except that a held one may slip in the hand."""
+    slip = np.abs(np.frombuffer(before[-1]) - np.frombuffer(now[-1])).max()
+    return before[:-1] == now[:-1] and bool(slip <= (MAX_SLIP if now[-2] else 0.0))
