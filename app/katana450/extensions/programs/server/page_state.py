@@ -146,11 +146,9 @@ def orders(program: Progress | None, *, may_begin: bool, rewinds: bool) -> tuple
     return tuple(order.value for order, is_offered in offered.items() if may_begin and is_offered)
 
 
-SHOWN = "shown"
-"""Mark of the step at the time of the preview that is looked at."""
-
-DONE, NOW, NEXT, ENDED_HERE, SKIPPED = "done", "now", "next", "ended here", "skipped"
-"""Marks of steps during a run and after it."""
+SHOWN, DONE, NOW, NEXT, ENDED_HERE = "shown", "done", "now", "next", "ended here"
+SKIPPED = "skipped"
+"""Marks of steps: of the one that the preview shows, and during a run and after it."""
 
 
 def planned_steps(

@@ -171,6 +171,7 @@ class ProgramPlanner:
     Attributes:
         planning: the last planning; None before the first script.
         then: the order that is carried out as soon as the planning has succeeded; None for none.
+        parts: the parts of the incomplete script of each sender, by the key of the person.
     """
 
     def __init__(self, hub: Hub, owner: ProgramOwner) -> None:
@@ -179,8 +180,7 @@ class ProgramPlanner:
         self.then: ProgramOrder | None = None
         self._hub = hub
         self._owner = owner
-        # The parts of the incomplete script of each sender.
-        self._parts: dict[str, str] = {}
+        self.parts: dict[str, str] = {}
         # Name of the script that the breakpoints belong to, and the indices of their steps.
         self._breakpoints: tuple[str, frozenset[int]] = "", frozenset()
 
@@ -202,11 +202,11 @@ class ProgramPlanner:
         while another program is planned, and InputError for too long a script.
         """
         check_may_drive(participant.person)
-        script = self._parts.pop(participant.person.key, "") + text
+        script = self.parts.pop(participant.person.key, "") + text
         if len(script.encode()) > MAX_BYTES:
             raise InputError(f"A script has at most {MAX_BYTES // 1024} KB.")
         if more:
-            self._parts[participant.person.key] = script
+            self.parts[participant.person.key] = script
             return False
         arm = self._hub.present()
         self.check_at_rest()
@@ -259,10 +259,6 @@ class ProgramPlanner:
             raise LeaseError("There is no program. Send a script first.")
         self._owner.check_may_steer(participant.person)
         self._breakpoints = self.planning.name, frozenset(step - 1 for step in steps)
-
-    def forget_parts(self, participant: Participant) -> None:
-        """Forget the parts of an incomplete script of ``participant``."""
-        self._parts.pop(participant.person.key, None)
 
     def check_free(self, participant: Participant) -> None:
         """Raise LeaseError unless the arm rests, and take the lease for ``participant``.

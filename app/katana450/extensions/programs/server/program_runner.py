@@ -202,7 +202,7 @@ class ProgramRunner(Runner):
 
     def leave(self, participant: Participant) -> None:
         """Forget ``participant``; end its program, or the run that waits for its planning."""
-        self.planner.forget_parts(participant)
+        self.planner.parts.pop(participant.person.key, None)
         self.end(participant, f"{participant.person.name} has left")
 
     def end(self, participant: Participant, why: str) -> None:

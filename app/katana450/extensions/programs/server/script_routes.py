@@ -82,15 +82,14 @@ class ScriptRoutes:
         axes: dict[str, list[float]] = {}
         gripper = NO_GRIPPER
         if arm is not None:
-            model = arm.robot.arm or arm.robot.joint_group
+            mounted = arm.robot.arm
+            model = mounted or arm.robot.joint_group
             gripper, limits = model.gripper, model.limits
             ends = np.degrees((limits.lower, limits.upper)).T.round(DIGITS).tolist()
             names["axes"] = axes = dict(zip(arm.robot.joint_labels, ends, strict=True))
             names["objects"] = [body.name for body in arm.state.objects]
-            names["tools"] = () if arm.robot.arm is None else arm.robot.arm.tools
-            names["unsuited"] = (
-                ("yaw",) if arm.robot.arm and arm.robot.arm.kinematics.is_pitched else ()
-            )
+            names["tools"] = () if mounted is None else mounted.tools
+            names["unsuited"] = ("yaw",) if mounted and mounted.kinematics.is_pitched else ()
 
         def reading(text: str) -> Response:
             answer: dict[str, Any] = {"problems": (), "taught": None, "blocks": None}
