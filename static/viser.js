@@ -115,13 +115,13 @@ function isWhole() {
   return !firstMessageBatch && !messageQueue.length && !missing().length;
 }
 
-// Return the names of visible nodes that are not loaded.
-export function missing() {
+/** Return the names of visible nodes, and of those `wanted`, that are not loaded. @param {string[]} wanted */
+export function missing(wanted = []) {
   const nodes = drawing().nodeRefFromName;
   const parents = [...shown].filter(([, visible]) => !visible).map(([name]) => name);
   /** @param {string} name */
   const isHidden = (name) => parents.some((parent) => name === parent || name.startsWith(`${parent}/`));
-  return [...shown.keys()].filter((name) => !nodes[name] && !written.has(name) && !isHidden(name));
+  return [...shown.keys(), ...wanted].filter((name) => !nodes[name] && !written.has(name) && !isHidden(name));
 }
 
 /**

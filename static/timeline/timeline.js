@@ -14,6 +14,8 @@ const [STEP, LONG_STEP] = [0.1, 1]; // s of the arrow keys, and with Shift
 const NEAR = 0.15; // s, within which a mark is at a moment
 // Nodes of the present that are hidden while the past is shown, beside the links that move.
 const PRESENT = /^\/(ghost|cup|basin|water|velocity|(target|handles|objects|path|branch)\/[^/]+)$/;
+const RECORDED = "/playback/0/arm";
+const [LOOK, LONG_LOAD] = [30, 3000]; // ms between two looks at whether it is drawn, and until the present goes without it
 const CONTINUE = "continuation"; // id of the request
 // Requests that do not concern what is seen, or only once they are done.
 const QUIET = /^(stop|rename|continue_from|ask|withdraw|decline|give|acquire|take|release_lease|query|heartbeat|breakpoints|speed)$/;
@@ -260,7 +262,10 @@ export class Timeline {
       while (this.#t !== null && this.#t !== asked) {
         asked = this.#t;
         const { moving } = await api.show({ page: this.#page.name, of: this.#of, t: asked, ...this.#secondAt(asked) });
-        if (this.#t !== null && !this.#hidden) sceneOf(this.#page.scene)?.hideNodes((name) => PRESENT.test(name) || moving.includes(name));
+        const scene = sceneOf(this.#page.scene);
+        const end = performance.now() + LONG_LOAD;
+        while (!this.#hidden && scene?.missing([RECORDED]).length && performance.now() < end) await new Promise((next) => setTimeout(next, LOOK));
+        if (this.#t !== null && !this.#hidden) scene?.hideNodes((name) => PRESENT.test(name) || moving.includes(name));
         this.#hidden = this.#t !== null;
       }
     } catch (error) {

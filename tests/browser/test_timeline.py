@@ -43,6 +43,15 @@ DROP = """([name, bytes]) => {
 }"""
 """Script that drops a file on the page."""
 
+COUNT_GAPS = """(arms) => {
+    window.gaps = 0;
+    (function look() {
+        gaps += !arms.some(harness.shows);
+        requestAnimationFrame(look);
+    })();
+}"""
+"""Script that counts the frames in which none of these nodes is visible."""
+
 CUT = """(all) => all.filter((each) => {
     const pen = document.createElement("canvas").getContext("2d");
     const { font, paddingLeft } = getComputedStyle(each);
@@ -132,9 +141,10 @@ def test_past_is_shown_in_one_window_until_stop(
     begin = run.at(run.spans[0].start)
     assert begin is not None
 
+    page.frame.evaluate(COUNT_GAPS, [LINK, GHOST])
     place(page, 0.0)
-    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
-    page.wait_until(lambda: not page.shows(LINK), "the present arm to be hidden")
+    page.wait_until(lambda: page.shows(GHOST) and not page.shows(LINK), "the recorded arm alone")
+    assert page.frame.evaluate("gaps") == 0
     page.wait_until(
         lambda: abs(shown_turn(page) - begin.row.joints[0]) < 1e-6, "the first recorded posture"
     )
