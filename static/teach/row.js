@@ -60,8 +60,7 @@ export class Row {
     const name = `pose ${i + 1}`;
     write(this.#number, String(i + 1));
     set(this.element, "aria-label", `${name[0].toUpperCase()}${name.slice(1)}`);
-    if (current) set(this.element, "aria-current", "step");
-    else this.element.removeAttribute("aria-current");
+    this.element.ariaCurrent = current ? "step" : null;
     if (this.#picture.getAttribute("src") !== pose.picture) {
       if (pose.picture) this.#picture.src = pose.picture;
       this.#picture.style.visibility = pose.picture ? "" : "hidden";

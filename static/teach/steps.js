@@ -250,8 +250,7 @@ export class Steps {
     const seconds = planned.reduce((sum, step) => sum + (step.mark === "skipped" ? 0 : step.seconds), 0);
     row.steps = numbers;
     if (round >= 0 && !element.ariaCurrent) element.scrollIntoView({ block: "nearest" });
-    if (round >= 0) set(element, "aria-current", "step");
-    else element.removeAttribute("aria-current");
+    element.ariaCurrent = round >= 0 ? "step" : null;
     set(element, "class", [mark, enabled ? "" : "off", isWrong ? "wrong" : ""].filter(Boolean).join(" "));
     set(element, "aria-level", depth + 1);
     element.style.setProperty("--depth", String(Math.min(depth, 6)));
