@@ -4,7 +4,8 @@ import { button, drawing, html, svg } from "../instruments/shape.js";
 import { clock } from "../page/words.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
-const EXPORTS = [["episode", "Episode, without what was rewound"], ["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["mp4", "MP4 film"]];
+const EXPORTS = [["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["mp4", "MP4 film"]];
+const OUTCOMES = [["success", "Success"], ["failure", "Failure"], ["unjudged", "Not judged"]];
 /** The words of each kind of mark. @type {Record<string, string>} */
 const KINDS = { stop: "Stop", clear_stop: "Stop cleared", driver: "Driver", program: "Script", step: "Motion", restore: "Continuation", contact: "Contact", limit: "Limit", episode: "Episode" };
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
@@ -23,6 +24,7 @@ const titled = (label, act, ...content) => button(content.length ? content : lab
 export class Controls {
   work = html("div", { class: "work", hidden: "" });
   exports = html("select", { "aria-label": "Export the selection" }, new Option("Export…", ""), ...EXPORTS.map(([name, words]) => new Option(words, name)));
+  keep = html("select", { title: "Keep the selection as an episode, without what was rewound" }, new Option("Keep as episode…", ""), ...OUTCOMES.map(([name, words]) => new Option(words, name)));
   clock = html("output", { class: "clock" }, "Live");
   marks = html("div", { class: "marks" });
   begin = range("end", "Start of the selection");
@@ -54,7 +56,7 @@ export class Controls {
     const track = html("div", { class: "track" }, this.marks, this.now, this.begin, this.end);
     const row = html("div", { class: "row" }, this.play, this.clock, this.speed, this.events, this.of, this.second,
         titled("Save selection", acts.save, "Save", html("span", {}, " selection")),
-        this.exports,
+        this.exports, this.keep,
         this.again,
         titled("Verify the selection: simulate it again and compare every tick", acts.verify, "Verify"),
         this.legend, fold, this.file);

@@ -79,19 +79,18 @@ export class Selection {
   // Export the part as the format `what`, or verify it. `words` says what is done.
   /** @param {Part | null} part @param {string} what @param {string} words */
   process(part, what, words) {
-    if (part && what === "episode") this.#keep(part);
-    else if (part) this.#work.start(what, part, words);
+    if (part) this.#work.start(what, part, words);
   }
 
-  // Keep the part as an episode that succeeded.
-  /** @param {Part} part */
-  async #keep({ of, from, to }) {
+  /** Keep the part as an episode. @param {Part | null} part @param {string} outcome */
+  async keep(part, outcome) {
     const { toast, name } = this.#page;
-    if (of !== RING) return toast("Episodes are kept from the last minutes, not from a file.");
+    if (!part) return;
+    if (part.of !== RING) return toast("Episodes are kept from the last minutes, not from a file.");
     try {
-      const body = JSON.stringify({ do: "keep", start: from, end: to });
+      const body = JSON.stringify({ do: "keep", start: part.from, end: part.to, outcome });
       const answer = await request(`api/v1/episodes?page=${name}`, { method: "POST", body });
-      toast(`Episode ${(await answer.json()).number} is kept as a success.`);
+      toast(`Episode ${(await answer.json()).number} is kept: see Episodes.`);
     } catch (error) {
       toast(messageOf(error));
     }

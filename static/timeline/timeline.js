@@ -149,8 +149,9 @@ export class Timeline {
   }
 
   #listen() {
-    const { now, begin, end, of, second, events, exports, file } = this.#part;
+    const { now, begin, end, of, second, events, exports, keep, file } = this.#part;
     onPick(exports, (what) => this.#selection.process(this.#selected(), what, `Export as ${exports.selectedOptions[0].text}`));
+    onPick(keep, (outcome) => this.#selection.keep(this.#selected(), outcome));
     onPick(events, (t) => this.#seek(Number(t)));
     now.addEventListener("input", () => this.#seek(atPlace(this.#spans, Number(now.value))));
     now.addEventListener("keydown", (event) => this.#key(event));

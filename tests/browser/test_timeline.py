@@ -120,6 +120,7 @@ def place(page: ViserPage, value: float, name: str = NOW) -> None:
 def check_kept(episodes: Path) -> None:
     """Check that the only file of ``episodes`` is whole, and that a rewind left a part of it."""
     (recording,) = map(katana450.open, episodes.glob("episode-*.mcap"))
+    assert [episode.outcome.value for episode in recording.episodes] == ["failure"]
     assert recording.verify().identical
     with RecordingFile.open(recording.path) as file:
         first, second = lasting_spans(file, recording.start, recording.end)
@@ -185,8 +186,8 @@ def test_past_is_shown_in_one_window_until_stop(
     page.page.locator("#timeline .marks i[title*='Continues from']").wait_for(state="attached")
     page.page.locator("#timeline .marks b.left").wait_for(state="attached")
     # What was before and after it is an episode, without what it was set back over.
-    page.page.get_by_label("Export the selection").select_option("episode")
-    page.page.get_by_text("is kept as a success").wait_for()
+    page.page.get_by_title("Keep the selection as an episode").select_option("failure")
+    page.page.get_by_text("Episode 1 is kept: see Episodes.").wait_for()
     page.keep(artefacts / "timeline-episode.png")
     check_kept(folder.parent / "episodes")
 
