@@ -47,6 +47,20 @@ def test_page_on_a_phone_has_room_for_each_language(
     assert page.evaluate("document.documentElement.scrollWidth") == PORTRAIT[0]
 
 
+@pytest.mark.parametrize(
+    "language", ["fr", *(pytest.param(x, marks=pytest.mark.long) for x in ("de", "en"))]
+)
+def test_bar_of_a_stop_fits_into_windows_of_every_width(
+    language: str, server: AppServer, open_page: OpenPage
+) -> None:
+    page = open_page(server.url, drawing=Drawing.NONE, locale=language).page
+    page.click("#stop")
+    page.wait_for_selector("#clear-stop:visible")
+    for width in range(570, 1920, 30):
+        page.set_viewport_size({"width": width, "height": 900})
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
 def test_language_is_chosen_in_the_menu_and_kept(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, drawing=Drawing.NONE, locale="it-IT").page
     assert page.inner_text("#stop") == "STOP"
