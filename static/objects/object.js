@@ -157,6 +157,8 @@ export class ObjectForm {
   async #read() {
     const before = this.#objects;
     this.#objects = await readObjects();
+    // An object that stands in the arm may not be seen.
+    for (const { name, overlap } of this.#objects) if (overlap && !before.some((other) => other.name === name && other.overlap)) this.#page.toast(overlap);
     const names = this.#objects.map(({ name }) => name);
     const added = before.length ? names.find((name) => !before.some((object) => object.name === name)) : undefined;
     if (names.join("\n") !== before.map(({ name }) => name).join("\n")) {
@@ -186,7 +188,7 @@ export class ObjectForm {
     this.#permit();
     if (again) window.dispatchEvent(new CustomEvent("chosen", { detail: this.#name }));
     if (!object || (!again && (this.#sender || performance.now() - this.#acted < HELD || this.element.matches(":active")))) return;
-    const { colour, opacity, size, scale, hidden, T, held, fixed, zone } = object;
+    const { colour, opacity, size, scale, hidden, T, held, fixed, zone, overlap } = object;
     /** A typed text that is not sent yet stays. @param {HTMLInputElement} input @param {string | number} text */
     const fill = (input, text) => {
       if (again || input.value === input.defaultValue) input.defaultValue = input.value = String(text);
@@ -205,6 +207,6 @@ export class ObjectForm {
     this.#turn.value = String(Math.round(angle));
     this.#hidden.checked = hidden;
     this.#mounts.forEach((mount, i) => (mount.ariaPressed = String(fixed === (i === 0))));
-    write(this.#why, held ? "It is held: open the gripper first" : fixed ? "It is attached to the hand and moves with it." : "");
+    write(this.#why, held ? "It is held: open the gripper first" : fixed ? "It is attached to the hand and moves with it." : overlap);
   }
 }

@@ -17,6 +17,7 @@ from katana450.arm.control.state.scene_objects import (
     Attachment,
     SceneObject,
     Shape,
+    Zone,
     same,
 )
 from katana450.arm.control.state.solid import ObjectAppearance, Solid
@@ -352,3 +353,20 @@ def test_detached_object_may_fall_on_the_table_but_not_beside_it() -> None:
         check_mounted(around, (), outside, Attachment.WORLD, x)
     camera = around.mounted(crate(at(0.3, 0.0, 0.3)), Attachment.HAND, x)
     check_mounted(around, (), camera, Attachment.WORLD, x)
+
+
+def test_object_that_stands_in_a_link_is_named_with_its_depth() -> None:
+    rules = describe_robot(Settings(), URDF_PATH, None).session
+    environment, x = rules.environment, rules.begin(rules.ready, 0.0, 0.0).x
+    box = SceneObject("block", Shape.BOX, (0.04, 0.04, 0.04), at(0.0, 0.0, 0.0))
+    text = environment.overlap(box, x)
+    assert text == "block overlaps the control box by 29 mm: move it, or undo."
+    assert "shoulder" in environment.overlap(replace(box, T=at(0.0, 0.0, 0.2)), x)
+    for other in (
+        replace(box, T=at(0.36, 0.0, -0.01)),
+        replace(box, zone=Zone.SLOW),
+        replace(box, fixed=True),
+    ):
+        assert environment.overlap(other, x) == ""
+    objects = rules.begin(rules.ready, 0.0, 0.0).objects
+    assert not any(environment.overlap(item, x) for item in objects)

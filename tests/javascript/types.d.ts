@@ -133,7 +133,7 @@ declare namespace Api {
   interface Scene { is: "scene"; id?: number | string | null; key: string; objects: string[]; text: string; }
   interface SceneObject { name: string; shape: string; size: number[]; T: number[][]; can_be_held: boolean;
     held: boolean; mesh: string | null; scale: number; colour: string | null; opacity: number; hidden: boolean;
-    fixed: boolean; zone: string; }
+    fixed: boolean; zone: string; overlap: string; }
   interface Servo { do: "servo"; q: number[]; qd?: number[] | null; gripper?: number | null;
     id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface Set { do: "set"; id?: number | string | null; revocations?: number | null; made?: number | null;

@@ -202,6 +202,12 @@ class CollisionWorld:
         matches = (pair for pair, (a, b) in enumerate(pairs) if {names[a], names[b]} in wanted)
         return min(map(placed.distance, matches), default=np.inf)
 
+    def deepest(self, x: FloatArray, new: Part, *excluded: str) -> Contact | None:
+        """Return the nearest contact at ``x`` (k,) of a ``new`` part with all but ``excluded``."""
+        count = len(self.parts)
+        pairs = [(k, count) for k, part in enumerate(self.parts) if part.name not in excluded]
+        return CollisionWorld(self.linkage, (*self.parts, new), pairs).nearest(x)
+
     @cached_property
     def fingerprint(self) -> Fingerprint:
         """The fingerprint by which an equal world is recognized, also in another process."""

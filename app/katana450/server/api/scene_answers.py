@@ -30,6 +30,7 @@ class SceneObject(msgspec.Struct, frozen=True, kw_only=True):
         mesh: Key of the mesh; null for another shape.
         colour: Colour such as "#94a3b8"; null for the colour of the file.
         fixed: Whether the object is fixed to the hand.
+        overlap: Sentence on the link in which the object stands; "" if it stands in none.
     """
 
     name: str
@@ -45,6 +46,7 @@ class SceneObject(msgspec.Struct, frozen=True, kw_only=True):
     hidden: bool = False
     fixed: bool = False
     zone: str = "none"
+    overlap: str = ""
 
 
 class Objects(Answer, frozen=True, kw_only=True):

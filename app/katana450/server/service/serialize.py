@@ -301,6 +301,7 @@ def objects(arm: ArmHandle) -> answers.Objects:
                 hidden=scene_object.appearance.hidden,
                 fixed=scene_object.fixed,
                 zone=scene_object.zone.value,
+                overlap=arm.environment.overlap(scene_object, now.x),
             )
             for scene_object in now.objects
         ]

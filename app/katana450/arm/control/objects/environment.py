@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from katana450.arm.control.arm import GripperModel
+from katana450.arm.control.state.messages import part, short
 from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Zone
 from katana450.caching import cached_property
-from katana450.maths.collision.clearance import MIN_CLEARANCE
+from katana450.maths.collision.clearance import DEPTH_ROUNDING, MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -140,6 +141,16 @@ class Environment:
             if parts:
                 world = world.with_carried(*parts, on_joint=parts is on_joint)
         return world
+
+    def overlap(self, item: SceneObject, x: FloatArray) -> str:
+        """Return a sentence on the link in which an object stands at ``x`` (k,), or ``""``."""
+        if self._world is None or item.carried or item.zone is Zone.SLOW:
+            return ""
+        contact = self._world.deepest(x, obstacle_of(item), "table")
+        if contact is None or contact.distance > -DEPTH_ROUNDING:
+            return ""
+        link, depth = part(contact.parts[0]), short(-1e3 * contact.distance)
+        return f"{item.name} overlaps the {link} by {depth} mm: move it, or undo."
 
     def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
         """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m].
