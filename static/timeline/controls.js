@@ -47,8 +47,7 @@ export class Controls {
     this.play = titled("Play", acts.play, icon("play"));
     this.again = titled("Run again the selected motion", acts.again, "Run again");
     this.speed.value = "1";
-    const back = titled("Back to live", acts.live);
-    back.className = "main";
+    const back = button("Back to live", acts.live, { class: "main" });
     const restore = titled("Continue from here: the arm, the objects and the water are set back to this moment", acts.restore, "Continue from here");
     this.past.append(this.#note, restore, back);
     const fold = titled("Fold the timeline away", acts.fold, "×");
@@ -61,7 +60,9 @@ export class Controls {
         titled("Verify the selection: simulate it again and compare every tick", acts.verify, "Verify"),
         this.legend, fold, this.file);
     // From below: the track stays where it is when the rest is shown.
-    box.replaceChildren(html("div", { class: "body" }, track, row, this.work));
+    const body = html("div", { class: "body" }, track, row, this.work);
+    box.replaceChildren(body);
+    new ResizeObserver(() => element("stage", HTMLElement).style.setProperty("--raise", `${box.offsetHeight - body.offsetHeight}px`)).observe(body);
   }
 
   /** Show or hide the note over the scene, which is empty while hidden. @param {boolean} shown */

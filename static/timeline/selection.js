@@ -2,7 +2,6 @@
 import { save, timestamp } from "../dom.js";
 import { messageOf, queryOf, request } from "../server.js";
 import { ScriptRun } from "../teach/run.js";
-import { RING } from "./api.js";
 import { lengthOf, placeOf } from "./axis.js";
 import { Work } from "./work.js";
 
@@ -86,7 +85,6 @@ export class Selection {
   async keep(part, outcome) {
     const { toast, name } = this.#page;
     if (!part) return;
-    if (part.of !== RING) return toast("Episodes are kept from the last minutes, not from a file.");
     try {
       const body = JSON.stringify({ do: "keep", start: part.from, end: part.to, outcome });
       const answer = await request(`api/v1/episodes?page=${name}`, { method: "POST", body });

@@ -234,7 +234,8 @@ export class Timeline {
 
   // Fill the lists of recordings.
   #list() {
-    const { of, second } = this.#part;
+    const { of, second, keep } = this.#part;
+    keep.hidden = this.#of !== api.RING;
     const may = this.#page.store.status?.role !== "viewer";
     const opened = () => [...this.#names].filter(([name]) => name !== api.RING).map(([name, words]) => new Option(words, name));
     const file = may ? [new Option("Open a file…", "file")] : [];
