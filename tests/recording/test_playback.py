@@ -261,12 +261,15 @@ def test_name_that_comes_after_the_press_is_that_of_the_stop() -> None:
 
 def test_continuation_is_marked_with_the_part_that_it_left() -> None:
     marks: list[Mark] = []
-    for t, recording in ((8, "ring"), (9, ""), (10, "opened.mcap")):
+    moments = ((8, "ring"), (9, ""), (10, "opened.mcap"), (133, "ring"), (11484, "ring"))
+    for t, recording in moments:
         add_marks(marks, [event(t, kind="restore", since=5.5, recording=recording)])
     assert [(mark.text, mark.since) for mark in marks] == [
         ("Continues from 2.5 s earlier", 5.5),
         ("Continues from 3.5 s earlier", 5.5),
         ("Continues from 5.5 s of a file", None),
+        ("Continues from 2 min 8 s earlier", 5.5),
+        ("Continues from 3 h 11 min earlier", 5.5),
     ]
 
 

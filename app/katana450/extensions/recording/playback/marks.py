@@ -110,7 +110,15 @@ def _restored(form: Mapping[str, Any]) -> str:
         return "Continues from another moment"
     if form.get("recording") not in OWN_RUN:
         return f"Continues from {since:.1f} s of a file"
-    return f"Continues from {t - since:.1f} s earlier"
+    return f"Continues from {_duration(t - since)} earlier"
+
+
+def _duration(seconds: float) -> str:
+    """Return a time [s] in words."""
+    if seconds < 60:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
 def _program(form: Mapping[str, Any]) -> tuple[str, str] | None:
