@@ -1,5 +1,5 @@
 // The small menu: the person's name, a picture, the address for a phone, and another robot.
-import { element, first, onClick, save, timestamp } from "./dom.js";
+import { element, first, onClick, save, t, timestamp } from "./dom.js";
 import { picture } from "./viser/pictures.js";
 
 const [NAME, LANGUAGE] = ["katana450.name", "katana450.language"];
@@ -31,7 +31,7 @@ function ask(name) {
 
 function open() {
   element("phone", HTMLDialogElement).close();
-  field.value = known;
+  field.value = t(known);
   theme.value = document.documentElement.dataset.theme === "dark" ? "Dark" : "Light";
   language.value = document.documentElement.lang;
   refuse("");
@@ -57,7 +57,7 @@ export function begin(context) {
   first("#who p", HTMLElement).addEventListener("click", toggle);
   element("own-name-form", HTMLFormElement).addEventListener("submit", (event) => {
     event.preventDefault();
-    ask(field.value);
+    ask(field.value === t(known) ? known : field.value);
   });
   theme.addEventListener("change", async () => (await import("./theme.js")).choose(theme.value));
   language.addEventListener("change", () => {
