@@ -1,6 +1,7 @@
 // The values of a step or a pose, each in a field.
 import { write } from "../dom.js";
 import { button, clamp, html, set } from "../instruments/shape.js";
+import { showToast } from "../page/words.js";
 
 /** @typedef {Omit<import("./blocks.js").Value, "line" | "column" | "end"> & { line?: number, column?: number, low?: number, high?: number }} Value */
 
@@ -51,6 +52,7 @@ export class Values {
       const isWrong = !words || (step && Number.isNaN(value));
       input.value = isWrong ? this.#fields[i].text : step ? String(value) : words;
       if (!isWrong) this.#change(i, input.value);
+      else if (step) showToast(`${name}: ${words || "nothing"} is not a number. It was not sent.`);
     });
     input.onkeydown = (event) => {
       const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
