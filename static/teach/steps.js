@@ -163,7 +163,8 @@ export class Steps {
       const place = `${line}:${column}`;
       numbers.set(place, [...(numbers.get(place) ?? []), i + 1]);
     });
-    this.#list.classList.toggle("planned", numbers.size > 0);
+    // An edit takes the plan away; the room of its buttons stays, so that the list does not jump.
+    if (text === null || numbers.size) this.#list.classList.toggle("planned", numbers.size > 0);
     const wrong = new Set(this.#sheet.editor.problems.map(({ line }) => indexAt(this.#blocks, line)));
     while (this.#rows.length > this.#blocks.length) this.#rows.pop()?.element.remove();
     while (this.#rows.length < this.#blocks.length) this.#list.append(this.#add(this.#rows.length).element);
