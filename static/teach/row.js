@@ -59,7 +59,7 @@ export class Row {
     const pose = (this.#pose = poses[i]);
     const name = `pose ${i + 1}`;
     write(this.#number, String(i + 1));
-    set(this.element, "aria-label", `${name[0].toUpperCase()}${name.slice(1)}`);
+    set(this.element, "aria-label", `Pose ${i + 1}`);
     this.element.ariaCurrent = current ? "step" : null;
     if (this.#picture.getAttribute("src") !== pose.picture) {
       if (pose.picture) this.#picture.src = pose.picture;
