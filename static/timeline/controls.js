@@ -24,7 +24,7 @@ const titled = (label, act, ...content) => button(content.length ? content : lab
 export class Controls {
   work = html("div", { class: "work", hidden: "" });
   exports = html("select", { "aria-label": "Export the selection" }, new Option("Export…", ""), ...EXPORTS.map(([name, words]) => new Option(words, name)));
-  keep = html("select", { title: "Keep the selection as an episode, without what was rewound" }, new Option("Keep as episode…", ""), ...OUTCOMES.map(([name, words]) => new Option(words, name)));
+  keep = html("select", { title: "Without what was rewound", "aria-label": "Keep the selection as an episode" }, new Option("Keep as episode…", ""), ...OUTCOMES.map(([name, words]) => new Option(words, name)));
   clock = html("output", { class: "clock" }, "Live");
   marks = html("div", { class: "marks" });
   begin = range("end", "Start of the selection");

@@ -186,7 +186,7 @@ def test_past_is_shown_in_one_window_until_stop(
     page.page.locator("#timeline .marks i[title*='Continues from']").wait_for(state="attached")
     page.page.locator("#timeline .marks b.left").wait_for(state="attached")
     # What was before and after it is an episode, without what it was set back over.
-    page.page.get_by_title("Keep the selection as an episode").select_option("failure")
+    page.page.get_by_label("Keep the selection as an episode").select_option("failure")
     page.page.get_by_text("Episode 1 is kept: see Episodes.").wait_for()
     page.keep(artefacts / "timeline-episode.png")
     check_kept(folder.parent / "episodes")
