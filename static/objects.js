@@ -18,6 +18,7 @@ let file = null; // the last one that was chosen
 let main = ""; // the file to read in it, if it is a .zip file of several
 /** @type {string | null} */
 let placed = null; // the name of its object
+let chosen = ""; // the object that the sheet shows
 let fitted = false; // whether its scale was chosen to fit
 /** @type {[number, number] | null} */
 let where = null; // [x, y] of the point of the table on which the files were dropped
@@ -45,9 +46,10 @@ async function ask(path, body) {
   return null;
 }
 
-/** Read the file and place its object; `again`: the unit of an object that is placed has changed. @param {boolean} again */
-async function add(again) {
+/** Read the file, or `part` of a .zip, and place its object; `again`: the unit of an object that is placed has changed. @param {boolean} again */
+async function add(again, part = main) {
   if (!file) return;
+  main = part;
   offer([]);
   report(`Reading ${file.name} …`);
   const query = new URLSearchParams({ name: file.name });
@@ -60,27 +62,17 @@ async function add(again) {
   mesh.name = again && placed ? placed : mesh.name;
   const fits = mesh.scale === 1;
   report(`${mesh.name}: ${fits ? "" : `placed at the scale ${mesh.scale}, which you can change below. `}${mesh.text}`);
-  // A unit that fits replaces a scale that was chosen to fit, but not one that was set for the object.
-  place(mesh, fits && !fitted ? undefined : mesh.scale);
-  fitted = !fits;
-}
-
-/** @param {Api.Mesh} mesh @param {number} [scale] */
-function place(mesh, scale) {
   placed = mesh.name;
   window.dispatchEvent(new Event("placed"));
-  page.say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key, ...(where && { near: where }), ...(scale && { scale }) });
+  // A unit that fits replaces a scale that was chosen to fit, but not one that was set for the object.
+  const scale = fits && !fitted ? {} : { scale: mesh.scale };
+  page.say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key, ...(where && { near: where }), ...scale });
+  fitted = !fits;
 }
 
 /** Offer the files of a .zip file, one of which is to be read. @param {string[]} choices */
 function offer(choices) {
-  byId("which").hidden = !choices.length;
-  /** @param {string} path */
-  const read = (path) => {
-    main = path;
-    add(false);
-  };
-  byId("which").replaceChildren(...choices.slice(0, 24).map((path) => button(path, () => read(path))));
+  byId("which").replaceChildren(...choices.slice(0, 24).map((path) => button(path, () => add(false, path))));
 }
 
 /** @param {File} scene */
@@ -88,6 +80,7 @@ async function load(scene) {
   report(`Reading ${scene.name} …`);
   const answer = await (await ask("scene", scene))?.json();
   if (!answer) return;
+  placed = null;
   page.say({ do: "load", scene: answer.key });
   report(answer.text);
 }
@@ -106,6 +99,12 @@ export function begin(context) {
   byId("load").addEventListener("click", () => byId("scene-file").click());
   byId("save").addEventListener("click", saveScene);
   unit.addEventListener("change", () => add(true));
+  // What is said of an object goes with it.
+  window.addEventListener("chosen", (event) => {
+    const { detail } = /** @type {CustomEvent<string>} */ (event);
+    if (placed && chosen === placed && detail !== placed) report("");
+    chosen = detail;
+  });
   onChoice(element("object-file", HTMLInputElement), take);
   onChoice(element("scene-file", HTMLInputElement), ([first]) => load(first));
 }
@@ -145,8 +144,7 @@ async function namesIn(file) {
 function read(first) {
   if (first.size > MAX_BYTES) return report(`${first.name} has ${Math.ceil(first.size / 1e6)} MB; at most ${MAX_BYTES / 1e6} are read.`, true);
   file = first;
-  main = "";
   placed = null;
   fitted = false;
-  return add(false);
+  return add(false, "");
 }
