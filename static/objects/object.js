@@ -195,6 +195,7 @@ export class ObjectForm {
     };
     const angle = Math.atan2(T[1][0], T[0][0]) * DEGREES;
     this.#colour.value = colour ?? PLAIN;
+    this.#colour.classList.toggle("own", !colour);
     this.#opacity.value = String(Math.round(100 * opacity));
     this.#percent.value = `${this.#opacity.value} %`;
     fill(this.#scale, scale);
