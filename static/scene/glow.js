@@ -32,6 +32,7 @@ export class Glow {
       if (this.#lit.has(shape)) continue;
       const mine = shape.material.clone();
       mine.emissive?.set(COLOUR);
+      mine.color.lerp(mine.emissive ?? mine.color, 2 * STRENGTH); // light is not seen on what is white
       mine.emissiveIntensity = STRENGTH;
       this.#lit.set(shape, [mine, shape.material]);
       shape.material = mine;

@@ -91,7 +91,7 @@ declare namespace Three {
   interface Vector2 { clone(): Vector2; set(x: number, y: number): this; }
   interface Quaternion { x: number; y: number; z: number; w: number; clone(): Quaternion; setFromRotationMatrix(m: Matrix4): this; multiply(q: Quaternion): this; setFromAxisAngle(axis: Vector3, angle: number): this; }
   interface Matrix4 { elements: number[]; clone(): Matrix4; invert(): this; multiply(m: Matrix4): this; copy(m: Matrix4): this; }
-  interface Colour { set(colour: number | string): void; }
+  interface Colour { set(colour: number | string): void; lerp(colour: Colour, fraction: number): void; }
   interface Material { clone(): Material; dispose(): void; color: Colour; opacity: number; emissive?: Colour; emissiveIntensity: number; }
   interface Geometry {
     attributes?: { position?: object }; boundingBox: { min: Vector3; max: Vector3 } | null; computeBoundingBox(): void;
