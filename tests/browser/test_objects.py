@@ -184,6 +184,7 @@ def test_chosen_file_is_refused_or_placed_changed_and_removed(
     form.get_by_role("button", name="Remove", exact=True).click()
     page.wait_until(lambda: objects(reader).keys() == before, "it to go")
     page.wait_until(lambda: choice.input_value() == "", "no object to be chosen in its place")
+    assert shown(page) == ""
     assert not form.get_by_role("button", name="Remove", exact=True).is_visible()
 
 
