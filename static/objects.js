@@ -99,7 +99,7 @@ export function begin(context) {
   byId("load").addEventListener("click", () => byId("scene-file").click());
   byId("save").addEventListener("click", saveScene);
   unit.addEventListener("change", () => add(true));
-  // What is said of an object goes with it.
+  // The text on an object goes with it.
   window.addEventListener("chosen", (event) => {
     const { detail } = /** @type {CustomEvent<string>} */ (event);
     if (placed && chosen === placed && detail !== placed) report("");
