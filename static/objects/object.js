@@ -103,8 +103,7 @@ export class ObjectForm {
     return this.#objects.find(({ name }) => name === this.#name);
   }
 
-  // A control that changes the object when it is used.
-  /** @param {string} name @param {import("../instruments/shape.js").Attributes} attributes @param {(value: string) => Partial<Api.Place>} change */
+  /** Return a control that changes the object when it is used. @param {string} name @param {import("../instruments/shape.js").Attributes} attributes @param {(value: string) => Partial<Api.Place>} change */
   #input(name, attributes, change) {
     const isTyped = attributes.type === "text" || attributes.type === "number";
     const input = html("input", { name, ...attributes });
@@ -150,6 +149,7 @@ export class ObjectForm {
   /** @param {Api.Act} request */
   #act(request) {
     this.#page.say(request);
+    if (this.#object && request.do === "place" && request.name === this.#name) this.#object.T = request.T ?? this.#object.T; // for the next coordinate
     this.#acted = performance.now();
     setTimeout(() => this.#read(), HELD);
   }

@@ -180,6 +180,11 @@ def test_chosen_file_is_refused_or_placed_changed_and_removed(
     page.wait_until(lambda: objects(reader)["ring"].scale == 0.15, "the scale")
     page.page.select_option("#unit", "")
     clear_refusals(page)
+    # One coordinate right after another. An object that stands in the arm is hidden by it.
+    for axis in "xy":
+        form.get_by_label(axis, exact=True).fill("0")
+        form.get_by_label(axis, exact=True).press("Enter")
+    page.wait_until(lambda: "ring overlaps the" in form.inner_text(), "the caution")
     page.keep(artefacts / "app-objects.png")
     form.get_by_role("button", name="Remove", exact=True).click()
     page.wait_until(lambda: objects(reader).keys() == before, "it to go")
