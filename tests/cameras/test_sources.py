@@ -14,8 +14,10 @@ from pathlib import Path
 
 import pytest
 
+from katana450.arm.runtime.pipes.private_listener import PrivateAddress
 from katana450.cli.main import main
 from katana450.extensions.cameras import sources
+from katana450.extensions.cameras.camera_link import CameraLink
 from katana450.extensions.cameras.sources import CameraError, frames
 from tests.cameras.mjpeg_camera import MjpegCamera, picture, stamp_of
 from tests.exchange.tools import OPENCV, needs_package
@@ -100,6 +102,15 @@ def test_camera_that_is_silent_or_away_is_lost(
         next(frames(f"http://127.0.0.1:{port}/"))
     with pytest.raises(CameraError, match="invalid address"):
         next(frames("http://127.0.0.1:port/"))
+
+
+def test_pages_that_come_and_go_share_one_thread() -> None:
+    link = CameraLink(PrivateAddress("/nowhere", b""))
+    for _ in range(5):
+        with link.watching(lambda: None):
+            pass
+    with link.watching(lambda: None):
+        assert [thread.name for thread in threading.enumerate()].count("cameras") == 1
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ ROSLIBPY = Package("roslibpy==2.1.0", "roslibpy/__init__.py", alone=False)
 """The client of rosbridge for Python; with Twisted, which nothing else needs."""
 
 OPENCV = Package("opencv-python-headless==4.11.0.86", "cv2/__init__.py")
-"""What reads cameras that send no MJPEG."""
+"""OpenCV, which reads cameras other than those of MJPEG over HTTP."""
 
 WHEELS = (OPENAPI_VALIDATOR, ROSLIBPY, OPENCV)
 """Packages of PyPI."""

@@ -44,13 +44,16 @@ class CameraLink:
         self._newest: dict[str, Picture] = {}
         self._lock = threading.Lock()
         self._wakers: set[Callable[[], object]] = set()
+        self._receives = False
 
     @contextmanager
     def watching(self, wake: Callable[[], object]) -> Iterator[None]:
         """Receive pictures meanwhile; ``wake`` is called in another thread with each of them."""
         with self._lock:
             self._wakers.add(wake)
-            if len(self._wakers) == 1:
+            # The thread of a page that has just left may still run.
+            if not self._receives:
+                self._receives = True
                 threading.Thread(target=self._receive, name="cameras", daemon=True).start()
         try:
             yield
@@ -64,7 +67,7 @@ class CameraLink:
 
     def _receive(self) -> None:
         decoder = msgspec.msgpack.Decoder(Picture)
-        while self._wakers:
+        while True:
             with (
                 suppress(*PIPE_ERRORS),
                 connect(self._address, Greeting(PAGE), GREETING_SECONDS) as connection,
@@ -75,6 +78,7 @@ class CameraLink:
             with self._lock:
                 self._newest.clear()
                 if not self._wakers:
+                    self._receives = False
                     return
             time.sleep(RETRY_SECONDS)
 

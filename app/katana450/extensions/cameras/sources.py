@@ -23,7 +23,7 @@ EXTRA = "cameras"
 """Name of the extra for all that is no MJPEG address."""
 
 PURPOSE = "Cameras of this machine, of RTSP, and films"
-"""What needs the extra."""
+"""Cameras that need the extra, as the subject of a sentence."""
 
 MAX_FRAME_BYTES = 4_000_000
 """[bytes] Maximum size of a picture; one of 640x480 takes 20 to 60 kB."""
