@@ -22,11 +22,12 @@ from katana450.arm.control.state.stop_cause import pressed
 from katana450.arm.drivers.driver import Driver, DriverAnswer, SimulatedDriver
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
-from katana450.arm.runtime.tick import TickRecord
+from katana450.arm.runtime.tick import Submission, TickRecord
 from katana450.assembly.robot_session import DescribedRobot, describe_robot
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.recording.files.header import Attachment, RecordingHeader, header_of
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.live.ring import RunEvents
 from katana450.extensions.recording.messages import StateRow, TargetMessage
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
@@ -218,3 +219,38 @@ def record(
         run(ticks, seed, take, commands)
         writer.close()
     return records
+
+
+def rewound(path: Path) -> list[State]:
+    """Record at ``path`` a drag of Ada that is set back twice, the second time to before the first.
+
+    Return the states before its 180 ticks: the ticks 70, 100, 130 and 150 continue from those of
+    40, 30, 120 and of another run.
+    """
+    events, states = RunEvents(), list[State]()
+    states.append(described().session.begin(described().session.ready, 0.0, 0.0))
+    rewinds = {70: (40, "ring"), 100: (30, ""), 130: (120, "ring"), 150: (10, "opened.mcap")}
+
+    def commands(
+        rng: np.random.Generator, state: State, robot: DescribedRobot
+    ) -> Iterator[cmd.Command]:
+        states.append(state)
+        source, name = rewinds.get(len(states), (None, ""))
+        if source is None:
+            yield from dragging(rng, state, robot)
+        else:
+            yield cmd.RestoreState(states[source], name)
+
+    with path.open("wb") as file:
+        writer = RecordingWriter(file, header())
+
+        def take(record: TickRecord) -> None:
+            named = tuple(Submission(command, ADA) for command, _ in record.submissions)
+            record = record._replace(submissions=named)
+            writer.put(record)
+            for kind, fields in events.of(record):
+                writer.event(record.t, kind, fields)
+
+        run(180, 1, take, commands, odd=False)
+        writer.close()
+    return states

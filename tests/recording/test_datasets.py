@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,17 +13,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import CommandChannel
-from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import Submission, TickRecord
-from katana450.assembly.robot_session import DescribedRobot
 from katana450.cli.main import main
 from katana450.errors import InputError
-from katana450.extensions.recording.datasets.lerobot_export import driven_by_person
+from katana450.extensions.recording.datasets.lerobot_export import sources_at
+from katana450.extensions.recording.datasets.lerobot_writer import SOURCES
+from katana450.extensions.recording.files.attempts import lasting_spans
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
-from katana450.extensions.recording.files.spans import Span, lasting_spans, length_of
+from katana450.extensions.recording.files.spans import Span, length_of
 from katana450.extensions.recording.files.table import (
     TICK,
     RecordedStates,
@@ -32,11 +31,10 @@ from katana450.extensions.recording.files.table import (
     sampled,
 )
 from katana450.extensions.recording.folders import new_folder
-from katana450.extensions.recording.live.ring import RunEvents
 from katana450.maths.geometry.arrays import FloatArray
 from tests.recording.dataset_files import episode, episode_folder, write_copy
 from tests.recording.lerobot_check import check_dataset, episodes_of, rows_of
-from tests.recording.recorded import ADA, described, dragging, header, run
+from tests.recording.recorded import ADA, described, dragging, header, rewound, run
 
 FPS = 25
 OUTCOMES = {"success": 3, "failure": 4, "unjudged": 6, "unfinished": 8}
@@ -101,35 +99,8 @@ def test_folder_of_episodes_is_a_dataset(
 
 
 def test_what_a_rewind_left_is_in_no_dataset(tmp_path: Path) -> None:
-    """Set an arm back twice, the second time to before the first, and once to another run."""
-    path, events = tmp_path / "run.mcap", RunEvents()
-    begin = described().session.begin(described().session.ready, 0.0, 0.0)
-    states: list[State] = [begin]
-    rewinds = {70: (40, "ring"), 100: (30, ""), 130: (120, "ring"), 150: (10, "opened.mcap")}
-
-    def commands(
-        rng: np.random.Generator, state: State, robot: DescribedRobot
-    ) -> Iterator[cmd.Command]:
-        states.append(state)
-        source, name = rewinds.get(len(states), (None, ""))
-        if source is None:
-            yield from dragging(rng, state, robot)
-        else:
-            yield cmd.RestoreState(states[source], name)
-
-    with path.open("wb") as file:
-        writer = RecordingWriter(file, header())
-
-        def take(record: TickRecord) -> None:
-            named = tuple(Submission(command, ADA) for command, _ in record.submissions)
-            record = record._replace(submissions=named)
-            writer.put(record)
-            for kind, fields in events.of(record):
-                writer.event(record.t, kind, fields)
-
-        run(180, 1, take, commands, odd=False)
-        writer.close()
-    ends = [state.t for state in states]
+    path = tmp_path / "run.mcap"
+    ends = [state.t for state in rewound(path)]
     with RecordingFile.open(path) as recording:
         begin_t, end = recording.start + 0.05, ends[140]
         spans = lasting_spans(recording, begin_t, end)
@@ -145,21 +116,20 @@ def test_what_a_rewind_left_is_in_no_dataset(tmp_path: Path) -> None:
     assert export(path, *words, *part, "--out", tmp_path / "set") == 0
     frames = np.array(rows_of(tmp_path / "set")["observation.state"])
     assert len(frames) == int(100.0 * length_of(spans) + 1e-6) + 1
-    # The arm moves on across each cut as it does within the limiter.
-
     # The arm moves across each cut as it does in any tick.
     speed = described().robot.require_arm().limits.speed
     assert (np.abs(np.diff(frames[:, :5], axis=0)) <= 0.0101 * speed).all()
 
 
-def test_frames_tell_whether_a_person_drove(tmp_path: Path) -> None:
-    path, ticks, script = tmp_path / "run.mcap", 60, replace(ADA, channel=CommandChannel.PROGRAM)
+def test_frames_tell_what_drove_the_arm(tmp_path: Path) -> None:
+    path, ticks = tmp_path / "run.mcap", 90
+    givers = [replace(ADA, channel=CommandChannel(name)) for name in ("program", "scene", "TCP")]
     times: list[float] = []
     with path.open("wb") as file:
         writer = RecordingWriter(file, header())
 
         def take(record: TickRecord) -> None:
-            giver = script if len(times) < ticks // 2 else ADA
+            giver = givers[3 * len(times) // ticks]
             times.append(record.t)
             named = tuple(Submission(command, giver) for command, _ in record.submissions)
             writer.put(record._replace(submissions=named))
@@ -167,10 +137,10 @@ def test_frames_tell_whether_a_person_drove(tmp_path: Path) -> None:
         run(ticks, 1, take, dragging, odd=False)
         writer.close()
     with RecordingFile.open(path) as recording:
-        people = driven_by_person(recording, np.array(times))
-    changes = np.flatnonzero(np.diff(people.astype(int)))
-    assert (bool(people[0]), len(changes)) == (False, 1)
-    assert ticks // 2 - 1 <= changes[0] < ticks // 2 + 3
+        sources = sources_at(recording, np.array(times))
+    assert [SOURCES[source] for source in sources[::30]] == ["program", "program", "person"]
+    changes = np.flatnonzero(np.diff(sources))
+    assert changes == pytest.approx([30, 60], abs=3)
 
 
 def test_outcomes_are_chosen(episodes: Path, tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
@@ -20,6 +19,7 @@ from katana450.extensions.media.film import VideoEncoder
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.datasets.lerobot_writer import (
     FIRST_FILE,
+    SOURCES,
     VIDEO_PATH,
     DatasetShape,
     LerobotWriter,
@@ -28,9 +28,10 @@ from katana450.extensions.recording.datasets.lerobot_writer import (
 )
 from katana450.extensions.recording.episodes.episode import JUDGED, EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_folder import episodes_in
+from katana450.extensions.recording.files.attempts import lasting_spans, source_of
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import check_whole, given_commands
-from katana450.extensions.recording.files.spans import Span, at_place, lasting_spans, length_of
+from katana450.extensions.recording.files.spans import Span, at_place, length_of
 from katana450.extensions.recording.files.table import (
     RecordedStates,
     check_fps,
@@ -39,7 +40,7 @@ from katana450.extensions.recording.files.table import (
     sampled,
 )
 from katana450.extensions.recording.folders import new_folder
-from katana450.maths.geometry.arrays import BoolArray, FloatArray
+from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 CRF = 18
 """Quality of the encoding, from 0 (exact) to 51."""
@@ -263,14 +264,14 @@ class Exported:
 class _Episode:
     """An episode on its grid of frames: times (N,) [s], states and actions (N, n) [rad or m].
 
-    ``by_person`` (N,) tells whether a person drove the arm.
+    ``sources`` (N,) tells what drove the arm.
     """
 
     cut: EpisodeCut
     times: FloatArray
     state: FloatArray
     action: FloatArray
-    by_person: BoolArray
+    sources: IntArray
     gripper: bool
 
 
@@ -326,7 +327,7 @@ def export_lerobot(
                 row, statistics[feature] = video.end_episode()
                 columns.update(row)
             task, success = episode.cut.task, episode.cut.success
-            frames = episode.state, episode.action, episode.by_person
+            frames = episode.state, episode.action, episode.sources
             writer.add_episode(*frames, task, success, columns, statistics)
         # The last step of the progress.
         next(pictures, None)
@@ -367,7 +368,7 @@ def _sampled_episode(cut: EpisodeCut, fps: int) -> _Episode:
     with RecordingFile.open(cut.path) as file:
         table = columns_from(file, cut.spans[0].start, cut.spans[-1].end)
         times = cut.at(cut.frames(fps))
-        by_person = driven_by_person(file, times)
+        sources = sources_at(file, times)
     # The action of a frame is the setpoint of the next one: that of the same time would be the
     # state itself where a driver follows without delay.
     later = cut.at(cut.frames(fps) + 1.0 / fps)
@@ -377,29 +378,25 @@ def _sampled_episode(cut: EpisodeCut, fps: int) -> _Episode:
     if gripper:
         state.append(sampled(table["t"], table["gripper"], times)[:, None])
         action.append(sampled(table["t"], table["gripper_setpoint"], later)[:, None])
-    return _Episode(cut, times, np.hstack(state), np.hstack(action), by_person, gripper)
+    return _Episode(cut, times, np.hstack(state), np.hstack(action), sources, gripper)
 
 
-BY_HAND = (CommandChannel.PAGE, CommandChannel.SCENE)
-"""Channels of persons. Scripts have another one, and so have programs of the API."""
+def sources_at(file: RecordingFile, times: FloatArray) -> IntArray:
+    """Return the place in SOURCES of what gave the newest motion at each of ``times`` (N,) [s].
 
-
-def driven_by_person(file: RecordingFile, times: FloatArray) -> BoolArray:
-    """Return whether a person at a page gave the newest motion at each of ``times`` (N,) [s].
-
-    Before the first motion of the recording, that one counts. Raises InputError.
+    Before the first motion of the recording, that one counts; -1 without any. Raises InputError.
     """
     givers = [
-        (t, actor.channel in BY_HAND)
+        (t, SOURCES.index(source_of(actor.channel)))
         for t, (command, actor) in given_commands(file, end=float(times[-1]))
         if actor is not None
         and any(part.traits.supersedes and not part.traits.protective for part in command.parts)
     ]
     if not givers:
-        return np.zeros(len(times), bool)
-    begins, people = map(np.array, zip(*givers, strict=True))
+        return np.full(len(times), -1)
+    begins, sources = map(np.array, zip(*givers, strict=True))
     newest = np.searchsorted(begins, times, side="right") - 1
-    return np.asarray(people[np.maximum(newest, 0)])
+    return np.asarray(sources[np.maximum(newest, 0)])
 
 
 def _states(cuts: Sequence[EpisodeCut], fps: int, session: Session) -> Iterator[State]:

@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
+from katana450.extensions.recording.files.attempts import PERSON, POLICY, PROGRAM
 from katana450.extras import library
-from katana450.maths.geometry.arrays import BoolArray, FloatArray
+from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 """Quantiles by their names."""
@@ -116,6 +117,9 @@ DONE, SUCCEEDED = "next.done", "next.success"
 INTERVENTION = "complementary_info.is_intervention"
 """1 where a person drove the arm, by the name that learners from corrections read; else 0."""
 
+SOURCE, SOURCES = "complementary_info.source", (PERSON, PROGRAM, POLICY)
+"""What drove the arm: the place in SOURCES; -1 if nothing has moved it yet."""
+
 TIMESTAMP, FRAME, EPISODE, INDEX, TASK = (
     "timestamp",
     "frame_index",
@@ -184,7 +188,7 @@ class DatasetShape:
             **dict.fromkeys(self.videos.values(), pictures),
             **{name: _scalar("bool") for name in (DONE, SUCCEEDED)},
             **{name: _scalar("float32") for name in (INTERVENTION, TIMESTAMP)},
-            **{name: _scalar("int64") for name in (FRAME, EPISODE, INDEX, TASK)},
+            **{name: _scalar("int64") for name in (SOURCE, FRAME, EPISODE, INDEX, TASK)},
         }
 
     def info(self, episodes: int, frames: int, tasks: int) -> dict[str, Any]:
@@ -273,7 +277,7 @@ class LerobotWriter:
         self,
         state: FloatArray,
         action: FloatArray,
-        by_person: BoolArray,
+        sources: IntArray,
         task: str,
         success: bool | None,
         videos: Mapping[str, Any],
@@ -284,7 +288,7 @@ class LerobotWriter:
         Args:
             state: (N, n) state of each frame [rad or m].
             action: (N, n) action of each frame [rad or m].
-            by_person: (N,) whether a person drove the arm in each frame.
+            sources: (N,) the place in SOURCES of what drove the arm in each frame, or -1.
             task: its task.
             success: whether the task was done; None if that is not known.
             videos: further columns of its row, which tell where its pictures are.
@@ -309,7 +313,8 @@ class LerobotWriter:
         columns: dict[str, npt.NDArray[Any]] = {
             STATE: state.astype(np.float32),
             ACTION: action.astype(np.float32),
-            INTERVENTION: by_person.astype(np.float32),
+            INTERVENTION: (sources == SOURCES.index(PERSON)).astype(np.float32),
+            SOURCE: sources,
             DONE: last,
             SUCCEEDED: last & (success is True),
             TIMESTAMP: (np.arange(count) / self._shape.fps).astype(np.float32),

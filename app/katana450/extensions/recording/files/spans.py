@@ -5,16 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.simulation import content_of
-from katana450.extensions.recording.files.table import TICK
-from katana450.extensions.recording.messages import EVENTS
-
 MAX_PAUSE = 2.0
 """[s] Time without a record from which on a new span begins."""
-
-OWN_RUN = ("", "ring")
-"""Recordings that a state of the same run is restored from."""
 
 
 class Span(NamedTuple):
@@ -52,24 +44,3 @@ def at_place(spans: Sequence[Span], place: float) -> float:
 def length_of(spans: Iterable[Span]) -> float:
     """Return the length [s] of the axis."""
     return sum(span.length for span in spans)
-
-
-def lasting_spans(file: RecordingFile, start: float, end: float) -> tuple[Span, ...]:
-    """Return the spans of the part from ``start`` to ``end`` [s] that lead to its last state.
-
-    Where the arm was set back to a moment of the same run, what came after that moment is left
-    out. Where it was set to a state of another run, or to one before the part, all that came
-    before is left out. Raises InputError.
-    """
-    events = [content_of(message, dict) for message in file.messages(EVENTS)]
-    spans: list[Span] = []
-    for event in reversed([event for event in events if event.get("kind") == "restore"]):
-        t, since = float(event["t"]), float(event["since"])
-        if not start < t < end:
-            continue
-        spans.append(Span(t, end))
-        # The first tick of the new run is the one after that state.
-        end = since + TICK if event["recording"] in OWN_RUN else start
-        if not start < end < t:
-            return tuple(reversed(spans))
-    return (Span(start, end), *reversed(spans))
