@@ -442,6 +442,22 @@ class EpisodeActs:
             note: The new remarks; None to keep them.
         """
 
+    def describe_attempt(
+        self,
+        t: float,
+        name: str = ...,
+        outcome: Literal["unjudged", "success", "failure"] = ...,
+        hidden: bool = ...,
+    ) -> int:
+        """Name or judge an attempt of the last minutes, or take it out of the list.
+
+        Args:
+            t: A moment of the attempt, as the timeline counts [s since the epoch].
+            name: Its name; empty for none.
+            outcome: Its outcome.
+            hidden: Whether lists leave it out. Nothing is deleted.
+        """
+
     def trim(self, number: int, start: float, end: float) -> int:
         """Give an episode another start and end. Nothing is deleted, so it can be widened again.
 

@@ -165,7 +165,7 @@ class EpisodeClient(EpisodeActs):
         return tuple(_understood(self._site.fetched(PATH), _List).episodes)
 
     def ask(self, request: EpisodeRequest) -> int:
-        """Send ``request``; return the number of its episode."""
+        """Send ``request``; return the number of its episode; 0 for one about an attempt."""
         content = self._site.fetched(PATH, msgspec.json.encode(request))
         return _understood(content, _Done).number
 

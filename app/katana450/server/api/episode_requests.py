@@ -128,6 +128,22 @@ class DescribeEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="describe")
     note: Remark | None = None
 
 
+class DescribeAttempt(EpisodeRequest, frozen=True, kw_only=True, tag="describe_attempt"):
+    """Name or judge an attempt of the last minutes, or take it out of the list.
+
+    Attributes:
+        t: A moment of the attempt, as the timeline counts [s since the epoch].
+        name: Its name; empty for none.
+        outcome: Its outcome.
+        hidden: Whether lists leave it out. Nothing is deleted.
+    """
+
+    t: float
+    name: Task = ""
+    outcome: Judgement = "unjudged"
+    hidden: bool = False
+
+
 class TrimEpisode(EpisodeRequest, frozen=True, kw_only=True, tag="trim"):
     """Give an episode another start and end. Nothing is deleted, so it can be widened again.
 
@@ -151,6 +167,7 @@ AnyEpisodeRequest = (
     | RerecordEpisode
     | KeepEpisode
     | DescribeEpisode
+    | DescribeAttempt
     | TrimEpisode
 )
 

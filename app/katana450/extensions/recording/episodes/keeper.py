@@ -7,6 +7,7 @@ read meanwhile.
 from __future__ import annotations
 
 import logging
+import math
 import os
 import threading
 import time
@@ -27,12 +28,15 @@ from katana450.extensions.recording.episodes.episode import (
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, EpisodeMarker
 from katana450.extensions.recording.episodes.running_episode import (
     MAX_SECONDS,
+    NOTHING,
     RunningEpisode,
     finish_interrupted,
 )
+from katana450.extensions.recording.files.attempts import ATTEMPT
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live.ring import Ring
 from katana450.server.api.episode_requests import (
+    DescribeAttempt,
     DescribeEpisode,
     DiscardEpisode,
     EpisodeRequest,
@@ -205,6 +209,18 @@ class EpisodeKeeper:
                 texts = {"task": task, "note": note}
                 changes = {name: text for name, text in texts.items() if text is not None}
                 episode = self._change(number, "noted", **changes)
+            case DescribeAttempt(name=name, outcome=outcome, hidden=hidden):
+                with self._ring.lock:
+                    last = self._ring.last_t
+                    if not math.isfinite(last):
+                        raise InputError(NOTHING)
+                    # Descriptions of episodes may be newer than the newest tick. This one has its
+                    # time, so that the recording becomes no longer.
+                    moment = min(request.t - self._utc_offset, last)
+                    description = {"since": moment, "name": name.strip(), "outcome": outcome}
+                    content = ATTEMPT, {**description, "hidden": hidden, "by": by.name}
+                    self._ring.describe(last, content)
+                return {**description, "number": 0}
             case TrimEpisode(number=number, start=start, end=end):
                 episode = self._trim(number, start, end)
             case _:

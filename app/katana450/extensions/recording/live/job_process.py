@@ -106,7 +106,7 @@ def result_of(task: JobTask) -> JobReport:
     words = ""
     match task.make:
         case "recording":
-            out = part
+            out, words = part, f"{part.name}."
         case "script":
             out = part.with_name("again.yaml")
             with RecordingFile.open(part) as file:

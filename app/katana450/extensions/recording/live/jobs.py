@@ -214,8 +214,8 @@ class RecordingRoutes:
         """Begin a job, and return its name."""
         self._context.driver(request, "export")
         do = request.query_params.get("do", "")
-        if do != VERIFY and do not in FORMATS:
-            known = ", ".join((VERIFY, *FORMATS))
+        if do not in (kinds := (VERIFY, *FORMATS, "recording")):
+            known = ", ".join(kinds)
             raise HTTPException(HTTPStatus.BAD_REQUEST, f"`do` is one of {known}, not {do!r}.")
         task = job_task(self._store, request.query_params, do, self._urdf)
         if any(earlier.status is JobStatus.WORKING for earlier in self._jobs.values()):

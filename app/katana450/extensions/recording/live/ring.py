@@ -19,6 +19,7 @@ from katana450.arm.control.state.modes import Following
 from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.episodes.episode import EpisodeMessage
+from katana450.extensions.recording.files.attempts import DRIVER, RESTORE
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.folders import SUFFIX, recordings_in
@@ -42,8 +43,8 @@ RETRY_SECONDS = 5.0
 
 log = logging.getLogger(__name__)
 
-STOP, CLEAR_STOP, DRIVER, STEP, RESTORE = "stop", "clear_stop", "driver", "step", "restore"
-"""Kinds of these events."""
+STOP, CLEAR_STOP, STEP = "stop", "clear_stop", "step"
+"""Kinds of these events, beside DRIVER and RESTORE."""
 
 
 class RunEvents:
@@ -168,13 +169,16 @@ class Ring:
         """Write the record of a tick."""
         self.put_all([record])
 
-    def describe(self, t: float, episode: EpisodeMessage) -> None:
-        """Write and sync the message ``episode`` about an episode at ``t`` [s]."""
+    def describe(self, t: float, content: EpisodeMessage | tuple[str, Mapping[str, Any]]) -> None:
+        """Write and sync the message of an episode, or an event with its fields, at ``t`` [s]."""
         if not self._opened():
             return
         assert self._writer is not None
         try:
-            self._writer.episode(t, episode)
+            if isinstance(content, tuple):
+                self._writer.event(t, *content)
+            else:
+                self._writer.episode(t, content)
         except OSError as error:
             self._fail(error)
         self.sync()

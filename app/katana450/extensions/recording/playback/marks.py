@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import Finding, Reason
+from katana450.extensions.recording.files import attempts
 from katana450.extensions.recording.files.recording_file import Message
-from katana450.extensions.recording.files.spans import OWN_RUN
 from katana450.extensions.recording.forms import FormError, json_form
 from katana450.extensions.recording.live import ring
 from katana450.extensions.recording.messages import EPISODES
@@ -37,13 +37,12 @@ class Mark(NamedTuple):
     """A mark at ``t`` [s].
 
     Its ``kind`` is stop, clear_stop, driver, program, step, restore, contact, limit or
-    episode. ``since``: moment of the same run to which a restore set the arm back [s].
+    episode.
     """
 
     t: float
     kind: str
     text: str
-    since: float | None = None
 
 
 def add_marks(marks: list[Mark], messages: Iterable[Message]) -> None:
@@ -77,9 +76,7 @@ def _all(messages: Iterable[Message]) -> Iterator[Mark]:
             ("episode", _episode(form)) if message.topic == EPISODES else _event(str(kind), form)
         )
         if words is not None:
-            since = form.get("since") if form.get("recording") in OWN_RUN else None
-            back = since if isinstance(since, int | float) and since < message.t else None
-            yield Mark(message.t, words[0], words[1][:MAX_TEXT], back)
+            yield Mark(message.t, words[0], words[1][:MAX_TEXT])
 
 
 def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
@@ -88,9 +85,9 @@ def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
             return NAMED if form.get("named") else kind, str(form.get("why") or "Stopped")
         case ring.CLEAR_STOP:
             return kind, "Stop cleared"
-        case ring.DRIVER if form.get("channel") != CommandChannel.PROGRAM.value:
+        case attempts.DRIVER if form.get("channel") != CommandChannel.PROGRAM.value:
             return kind, f"{form.get('name')} drives"
-        case ring.RESTORE:
+        case attempts.RESTORE:
             return kind, _restored(form)
         case "program":
             return _program(form)
@@ -108,7 +105,7 @@ def _restored(form: Mapping[str, Any]) -> str:
     t, since = form.get("t"), form.get("since")
     if not (isinstance(t, int | float) and isinstance(since, int | float)):
         return "Continues from another moment"
-    if form.get("recording") not in OWN_RUN:
+    if form.get("recording") not in attempts.OWN_RUN:
         return f"Continues from {since:.1f} s of a file"
     return f"Continues from {_duration(t - since)} earlier"
 

@@ -66,18 +66,27 @@ class PlaybackRoutes:
             Route(path, self._open, methods=["POST"]),
             Route(f"{path}/show", self._show, methods=["POST"]),
             Route(f"{path}/hide", self._hide, methods=["POST"]),
+            Route(f"{path}/{{name}}/difference", self._difference),
             Route(f"{path}/{{name}}", self._timeline),
         ]
 
     async def _timeline(self, request: Request) -> Response:
-        """Return spans and marks of a recording."""
+        """Return spans, marks and attempts of a recording."""
         run = self._run(request, request.path_params["name"])
 
         def read() -> Response:
             run.update()
-            return as_json({"spans": run.spans, "marks": run.marks()})
+            return as_json({"spans": run.spans, "marks": run.marks(), "attempts": run.attempts()})
 
         return await self._store.work.result(read)
+
+    async def _difference(self, request: Request) -> Response:
+        """Return what differs between the attempts at two moments of a recording."""
+        query, name = request.query_params, request.path_params["name"]
+        self._run(request, name)
+        moments = _number(query.get("t")), _number(query.get("t2"))
+        session = self._context.hub.present().session
+        return as_json(await self._store.difference(name, moments, session))
 
     async def _show(self, request: Request) -> Response:
         """Show a moment of one recording, or of two, in the window that asks."""

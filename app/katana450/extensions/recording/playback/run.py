@@ -9,11 +9,20 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from msgspec import structs
+
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
+from katana450.extensions.recording.files.attempts import (
+    Attempt,
+    TreeEvent,
+    tree_events,
+    tree_of,
+)
 from katana450.extensions.recording.files.recording_file import ChunkSpan, Message, RecordingFile
 from katana450.extensions.recording.files.simulation import (
     TickReader,
+    content_of,
     recorded_input,
 )
 from katana450.extensions.recording.files.spans import Span, spans_of
@@ -23,6 +32,7 @@ from katana450.extensions.recording.messages import (
     EVENTS,
     SOLIDS,
     STATE,
+    StateRow,
     TickMessage,
 )
 from katana450.extensions.recording.playback.marks import Mark, add_marks
@@ -47,7 +57,10 @@ MAX_SOLID_BYTES = 128_000_000
 """Maximum size of the solids of a file [bytes]."""
 
 MAX_MARKS = 400
-"""Number of marks of a timeline; the newest are kept."""
+"""Number of marks of a timeline, and of events of its tree; the newest are kept."""
+
+MAX_ROWS = 1000
+"""Number of states of which a part is measured."""
 
 
 class _File:
@@ -58,6 +71,7 @@ class _File:
         self.reader = TickReader()
         self.marked = 0
         self.marks: list[Mark] = []
+        self.events: list[TreeEvent] = []
         self.starts: list[int] = []
         """The numbers of the chunks with a complete state."""
         self._searched = 0
@@ -149,10 +163,37 @@ class PlaybackRun:
             # What follows from scripts and names is written later than it happens.
             marks.sort(key=lambda mark: mark.t)
             shift = self._offset
-            return [
-                Mark(t + shift, kind, text, None if since is None else since + shift)
-                for t, kind, text, since in marks[-MAX_MARKS:]
+            return [mark._replace(t=mark.t + shift) for mark in marks[-MAX_MARKS:]]
+
+    def attempts(self) -> list[Attempt]:
+        """Return the tree of attempts. Raises InputError for a damaged file."""
+        # The marks are read with the events.
+        self.marks()
+        with self._lock:
+            shift, spans = self._offset, self.spans
+            events = [
+                structs.replace(event, t=event.t + shift, since=event.since + shift)
+                for file in self._files
+                for event in file.events
             ]
+            return tree_of(events, spans[0].start, spans[-1].end) if spans else []
+
+    def rows(self, spans: Sequence[tuple[float, float]]) -> list[StateRow]:
+        """Return states in ``spans`` [s], in equal steps if there are more than MAX_ROWS.
+
+        Raises InputError for a damaged file.
+        """
+        with self._lock:
+            messages = [
+                message
+                for start, end in spans
+                for file in self._files
+                for message in file.index.messages(
+                    STATE, start=start - self._offset, end=end - self._offset
+                )
+            ]
+            step = -(-len(messages) // MAX_ROWS) or 1
+            return [content_of(message, StateRow) for message in messages[::step]]
 
     def at(self, t: float) -> RecordedMoment | None:
         """Return the state at ``t`` [s], or the first one after it; None without states.
@@ -235,6 +276,8 @@ class PlaybackRun:
             chunk = file.chunks[file.marked]
             file.marked += 1
             if file.index.has(chunk, EVENTS, EPISODES):
-                add_marks(file.marks, file.index.messages_of(chunk, EVENTS, EPISODES))
-                del file.marks[:-MAX_MARKS]
+                messages = file.index.messages_of(chunk, EVENTS, EPISODES)
+                add_marks(file.marks, messages)
+                file.events += tree_events(messages)
+                del file.marks[:-MAX_MARKS], file.events[:-MAX_MARKS]
         return file.marks

@@ -32,10 +32,16 @@ from weakref import WeakKeyDictionary
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
+from katana450.extensions.recording.files.attempts import Attempt, attempt_at, parted
 from katana450.extensions.recording.files.simulation import state_after
 from katana450.extensions.recording.files.spans import Span
 from katana450.extensions.recording.folders import SUFFIX, default_folder, recordings_in
-from katana450.extensions.recording.messages import TickMessage
+from katana450.extensions.recording.messages import StateRow, TickMessage
+from katana450.extensions.recording.playback.difference import (
+    AttemptDifference,
+    AttemptResult,
+    difference,
+)
 from katana450.extensions.recording.playback.marks import Mark
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.run import PlaybackRun
@@ -93,6 +99,16 @@ class OpenedRun:
         """See ``PlaybackRun.marks``."""
         marks: list[Mark] = self._ask("marks")
         return marks
+
+    def attempts(self) -> list[Attempt]:
+        """See ``PlaybackRun.attempts``."""
+        attempts: list[Attempt] = self._ask("attempts")
+        return attempts
+
+    def rows(self, spans: Sequence[tuple[float, float]]) -> list[StateRow]:
+        """See ``PlaybackRun.rows``."""
+        rows: list[StateRow] = self._ask("rows", spans)
+        return rows
 
     def at(self, t: float) -> RecordedMoment | None:
         """See ``PlaybackRun.at``."""
@@ -265,6 +281,36 @@ class RecordingStore:
             return state_after(session, run.input_until(t))
 
         return await self.work.result(simulated)
+
+    async def difference(
+        self, name: str, moments: tuple[float, float], session: Session
+    ) -> AttemptDifference:
+        """Return that of the attempts at two ``moments`` [s since the epoch] of the run ``name``.
+
+        Raises InputError for a damaged file, and for a state that cannot be simulated exactly.
+        """
+        run = self.run(name)
+
+        def paths() -> tuple[tuple[Span, ...], tuple[Span, ...]]:
+            run.update()
+            attempts = run.attempts()
+            first, second = (attempt_at(attempts, t).path for t in moments)
+            return parted(first, second)
+
+        both = await self.work.result(paths)
+        ends = [
+            await self.state_at(name, spans[-1].end if spans else t, session)
+            for spans, t in zip(both, moments, strict=True)
+        ]
+
+        def compared() -> AttemptDifference:
+            first, second = (
+                AttemptResult(spans, run.rows(spans), state)
+                for spans, state in zip(both, ends, strict=True)
+            )
+            return difference(session, first, second)
+
+        return await self.work.result(compared)
 
     def run(self, name: str) -> AnyRun:
         """Return the run ``name``. Raises InputError if there is none."""
