@@ -2,7 +2,8 @@
 import { queryOf, request } from "../server.js";
 
 /** @typedef {[start: number, end: number]} Span */
-/** @typedef {[t: number, kind: string, words: string, since: number | null]} Mark */
+/** @typedef {[t: number, kind: string, words: string]} Mark */
+/** What was done between two continuations: `since` is the moment of its parent that it continued from, `path` leads to its end. @typedef {{ number: number, parent: number | null, start: number, end: number, since: number | null, path: Span[], drivers: [name: string, source: string][], name: string, outcome: string, hidden: boolean }} Attempt */
 const API = "api/v1/playback";
 export const RING = "ring"; // name of the last minutes
 
@@ -15,8 +16,11 @@ export async function answered(url, options) {
 /** @param {string} url @param {BodyInit | null} body */
 const post = (url, body = null) => answered(url, { method: "POST", body });
 
-/** Return {spans, marks} of a recording. @param {string} of @returns {Promise<{ spans: Span[], marks: Mark[] }>} */
+/** Return {spans, marks, attempts} of a recording. @param {string} of @returns {Promise<{ spans: Span[], marks: Mark[], attempts: Attempt[] }>} */
 export const timeline = (of) => answered(`${API}/${encodeURIComponent(of)}`);
+
+/** Send a request about episodes from the window `page`. @param {string} page @param {object} body */
+export const ask = (page, body) => post(`api/v1/episodes?page=${page}`, JSON.stringify(body));
 
 // Show a moment in the window `page`, and one of a second recording if there is one.
 /** @param {Record<string, string | number>} query @returns {Promise<{ moving: string[] }>} */

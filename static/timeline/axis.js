@@ -24,8 +24,11 @@ export function placeOf(spans, t) {
   return place;
 }
 
-/** Return the bars on the track: episodes, and what the run left when it was set back. @param {import("./api.js").Mark[]} marks @param {import("./api.js").Span[]} spans */
-export function bars(marks, spans) {
+/** Return the attempt that was under way at `t`. @param {import("./api.js").Attempt[]} attempts @param {number} t */
+export const attemptAt = (attempts, t) => attempts.findLast(({ start }) => start <= t) ?? attempts[0];
+
+/** Return the bars on the track: episodes, continuations, and what did not lead to the attempt that is shown. @param {import("./api.js").Mark[]} marks @param {import("./api.js").Span[]} spans @param {import("./api.js").Attempt[]} attempts @param {import("./api.js").Attempt | undefined} shown */
+export function bars(marks, spans, attempts, shown) {
   const length = lengthOf(spans) || 1;
   /** @param {number} from @param {number} to @param {string} kind @param {string} title */
   const bar = (from, to, kind, title) => {
@@ -34,11 +37,12 @@ export function bars(marks, spans) {
     shape.style.cssText = `left: ${begin}%; width: ${end - begin}%`;
     return shape;
   };
-  return marks.flatMap(([t, kind, words, since]) => {
-    if (since !== null) return [bar(since, t, "left", "Left: the run was set back to the start of this part")];
+  const left = shown?.path.slice(1).map(([start], i) => bar(shown.path[i][1], start, "left", "Left: the run was set back to the start of this part")) ?? [];
+  const branches = attempts.filter(({ since, hidden }) => since !== null && !hidden).map(({ since, start, name, number }) => bar(since ?? 0, start, "branch", name || `Attempt ${number}`));
+  return marks.flatMap(([t, kind, words]) => {
     const [, name] = (kind === "episode" && /^(Episode \d+) begins/.exec(words)) || [];
     if (!name) return [];
     const [end] = marks.find(([, , other]) => other === `${name} ends`) ?? [Infinity];
     return [bar(t, end, "episode", words)];
-  });
+  }).concat(left, branches);
 }

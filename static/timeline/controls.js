@@ -5,7 +5,7 @@ import { clock } from "../page/words.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const EXPORTS = [["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["mp4", "MP4 film"]];
-const OUTCOMES = [["success", "Success"], ["failure", "Failure"], ["unjudged", "Not judged"]];
+export const OUTCOMES = [["success", "Success"], ["failure", "Failure"], ["unjudged", "Not judged"]];
 /** The words of each kind of mark. @type {Record<string, string>} */
 const KINDS = { stop: "Stop", clear_stop: "Stop cleared", driver: "Driver", program: "Script", step: "Motion", restore: "Continuation", contact: "Contact", limit: "Limit", episode: "Episode" };
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
@@ -19,10 +19,11 @@ const range = (name, label) => html("input", { type: "range", class: name, min: 
 /** @param {string} label @param {() => void} act @param {(Node | string)[]} content */
 const titled = (label, act, ...content) => button(content.length ? content : label, act, { title: label, "aria-label": label });
 
-/** What the buttons do. @typedef {Record<"play" | "again" | "live" | "restore" | "fold" | "save" | "verify", () => void>} Acts */
+/** What the buttons do. @typedef {Record<"play" | "again" | "live" | "restore" | "fold" | "save" | "verify" | "tree", () => void>} Acts */
 
 export class Controls {
   work = html("div", { class: "work", hidden: "" });
+  tree = html("section", { class: "tree", "aria-label": "Attempts", hidden: "" });
   exports = html("select", { "aria-label": "Export the selection" }, new Option("Export…", ""), ...EXPORTS.map(([name, words]) => new Option(words, name)));
   keep = html("select", { title: "Without what was rewound", "aria-label": "Keep the selection as an episode" }, new Option("Keep as episode…", ""), ...OUTCOMES.map(([name, words]) => new Option(words, name)));
   clock = html("output", { class: "clock" }, "Live");
@@ -46,6 +47,7 @@ export class Controls {
   constructor(box, acts) {
     this.play = titled("Play", acts.play, icon("play"));
     this.again = titled("Run again the selected motion", acts.again, "Run again");
+    this.attempts = titled("Attempts, and what they continued from", acts.tree, "Attempts");
     this.speed.value = "1";
     const back = button("Back to live", acts.live, { class: "main" });
     const restore = titled("Continue from here: the arm, the objects and the water are set back to this moment", acts.restore, "Continue from here");
@@ -55,12 +57,12 @@ export class Controls {
     const track = html("div", { class: "track" }, this.marks, this.now, this.begin, this.end);
     const row = html("div", { class: "row" }, this.play, this.clock, this.speed, this.events, this.of, this.second,
         titled("Save selection", acts.save, "Save", html("span", {}, " selection")),
-        this.exports, this.keep,
+        this.exports, this.keep, this.attempts,
         this.again,
         titled("Verify the selection: simulate it again and compare every tick", acts.verify, "Verify"),
         this.legend, fold, this.file);
     // From below: the track stays where it is when the rest is shown.
-    const body = html("div", { class: "body" }, track, row, this.work);
+    const body = html("div", { class: "body" }, track, row, this.tree, this.work);
     box.replaceChildren(body);
     new ResizeObserver(() => element("stage", HTMLElement).style.setProperty("--raise", `${box.offsetHeight - body.offsetHeight}px`)).observe(body);
   }

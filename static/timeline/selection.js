@@ -1,7 +1,7 @@
 // The selected part of a recording: its ends, and what can be done with it.
-import { save, timestamp } from "../dom.js";
 import { messageOf, queryOf, request } from "../server.js";
 import { ScriptRun } from "../teach/run.js";
+import { ask } from "./api.js";
 import { lengthOf, placeOf } from "./axis.js";
 import { Work } from "./work.js";
 
@@ -13,7 +13,6 @@ export class Selection {
   #page;
   #work; // exports and verifications
   run; // of a recorded motion
-  #saving = false;
   /** @type {[start: number | null, end: number | null]} */
   #ends = [null, null]; // [s since the epoch]; null: that of the recording
 
@@ -24,9 +23,9 @@ export class Selection {
     this.#work = new Work(box);
   }
 
-  // Select all of a recording.
-  clear() {
-    this.#ends = [null, null];
+  /** Select a part of a recording, or all of it. @param {number | null} start @param {number | null} end */
+  set(start = null, end = null) {
+    this.#ends = [start, end];
   }
 
   /** Put one end at a time: 0 is the start, 1 the end. They do not cross. @param {0 | 1} which @param {number} t @param {Span[]} spans */
@@ -57,25 +56,7 @@ export class Selection {
     return null;
   }
 
-  /** @param {Part | null} part */
-  async save(part) {
-    const { toast } = this.#page;
-    if (!part || this.#saving) return;
-    this.#saving = true;
-    toast("The recording is being made.");
-    try {
-      const answer = await request(`api/v1/recording?${queryOf(part)}`);
-      const name = `katana450-${timestamp()}.mcap`;
-      save(await answer.blob(), name);
-      toast(`The recording is saved as ${name}.`);
-    } catch (error) {
-      toast(`Nothing was saved: ${messageOf(error)}`);
-    } finally {
-      this.#saving = false;
-    }
-  }
-
-  // Export the part as the format `what`, or verify it. `words` says what is done.
+  // Export or save the part as the format `what`, or verify it. `words` says what is done.
   /** @param {Part | null} part @param {string} what @param {string} words */
   process(part, what, words) {
     if (part) this.#work.start(what, part, words);
@@ -86,9 +67,8 @@ export class Selection {
     const { toast, name } = this.#page;
     if (!part) return;
     try {
-      const body = JSON.stringify({ do: "keep", start: part.from, end: part.to, outcome });
-      const answer = await request(`api/v1/episodes?page=${name}`, { method: "POST", body });
-      toast(`Episode ${(await answer.json()).number} is kept: see Episodes.`);
+      const { number } = await ask(name, { do: "keep", start: part.from, end: part.to, outcome });
+      toast(`Episode ${number} is kept: see Episodes.`);
     } catch (error) {
       toast(messageOf(error));
     }

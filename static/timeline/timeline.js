@@ -4,7 +4,7 @@ import { html } from "../instruments/shape.js";
 import { addressed } from "../page/words.js";
 import { messageOf } from "../server.js";
 import * as api from "./api.js";
-import { atPlace, bars, lengthOf, placeOf } from "./axis.js";
+import { atPlace, attemptAt, bars, lengthOf, placeOf } from "./axis.js";
 import { Controls, timeInWords } from "./controls.js";
 import { NOTHING, Selection } from "./selection.js";
 
@@ -33,6 +33,12 @@ export class Timeline {
   #spans = [];
   /** @type {api.Mark[]} */
   #marks = [];
+  /** @type {api.Attempt[]} */
+  #attempts = [];
+  /** @type {api.Attempt | undefined} */
+  #attempt; // the one that is shown, or under way
+  /** @type {import("./attempts.js").Attempts | null} */
+  #tree = null;
   /** @type {number | null} */
   #t = null; // the moment that is shown [s since the epoch]; null while the window is live
   /** @type {number | null} */
@@ -57,8 +63,9 @@ export class Timeline {
       play: () => this.#play(this.#playing === null),
       live: () => this.live(),
       restore: () => this.#restore(),
+      tree: () => this.#openTree(),
       again: () => this.#again(),
-      save: () => this.#selection.save(this.#selected()),
+      save: () => this.#selection.process(this.#selected(), "recording", "Export"),
       verify: () => this.#selection.process(this.#selected(), "verify", "Verify"),
     });
     page.stage.append(this.#part.past);
@@ -187,18 +194,17 @@ export class Timeline {
     this.#news -= 1;
     try {
       const of = this.#of;
-      const { spans, marks } = await api.timeline(of);
+      const { spans, marks, attempts } = await api.timeline(of);
       if (of !== this.#of) return;
-      this.#spans = spans;
+      [this.#spans, this.#attempts, this.#attempt] = [spans, attempts, undefined];
       const { name = "" } = this.#page.store.status ?? {};
-      this.#marks = marks.map(([t, kind, words, since]) => [t, kind, addressed(words, name), since]);
+      this.#marks = marks.map(([t, kind, words]) => [t, kind, addressed(words, name)]);
       this.#failed = false;
     } catch (error) {
       // Once, not each time, and to a person who looks at it.
       if (!this.#failed && this.open) this.#page.toast(messageOf(error));
       this.#failed = true;
     }
-    this.#drawMarks();
     this.#draw();
   }
 
@@ -206,22 +212,22 @@ export class Timeline {
   async #choose(of) {
     this.live();
     this.#compare("");
-    this.#selection.clear();
-    [this.#of, this.#spans, this.#marks, this.#failed] = [of, [], [], false];
+    this.#selection.set();
+    [this.#of, this.#spans, this.#marks, this.#attempts, this.#failed] = [of, [], [], [], false];
     await this.#refresh();
     if (this.#failed && of !== api.RING) return this.#choose(api.RING); // the server no longer has it
     this.#list();
     if (of !== api.RING && this.#spans.length) this.#seek(this.#spans[0][0]);
   }
 
-  /** @param {string} choice */
-  async #compare(choice) {
+  /** @param {string} choice @param {number | null} t that of the second run at its start */
+  async #compare(choice, t = this.#t) {
     this.#second = null;
     if (choice) {
       try {
         const of = choice === "here" ? this.#of : choice;
         const { spans } = await api.timeline(of);
-        const begin = choice === "here" ? (this.#t ?? spans[0][0]) : spans[0][0];
+        const begin = choice === "here" ? (t ?? spans[0][0]) : spans[0][0];
         const mine = this.#selection.start(this.#spans);
         this.#second = { of, begin, spans, mine };
         this.#seek(mine);
@@ -290,7 +296,7 @@ export class Timeline {
 
   /** @param {boolean} plays */
   #play(plays) {
-    if (plays && this.#t === null) this.#seek(this.#selection.start(this.#spans));
+    if (plays && (this.#t ?? Infinity) >= this.#selection.end(this.#spans)) this.#seek(this.#selection.start(this.#spans));
     if (plays === (this.#playing !== null) || (plays && this.#t === null)) return;
     this.#playing = plays ? performance.now() : null;
     this.#part.showPlaying(plays);
@@ -325,7 +331,20 @@ export class Timeline {
     this.#selection.runAgain(part);
   }
 
+  async #openTree() {
+    const { Attempts } = await import("./attempts.js");
+    this.#tree ??= new Attempts(this.#part.tree, this.#page, { selection: this.#selection, seek: (t) => this.#seek(t), beside: (t) => this.#compare("here", t), change: () => this.#refresh() });
+    this.#part.tree.hidden = !this.#part.tree.hidden;
+    this.#attempt = undefined;
+    this.#draw();
+  }
+
   #draw() {
+    const attempt = attemptAt(this.#attempts, this.#t ?? Infinity);
+    if (attempt !== this.#attempt || !attempt) {
+      this.#attempt = attempt;
+      this.#drawMarks();
+    }
     const { now, begin, end, clock, moment, marks } = this.#part;
     const length = lengthOf(this.#spans);
     const place = this.#t === null ? length : placeOf(this.#spans, this.#t);
@@ -363,7 +382,11 @@ export class Timeline {
       return mark;
     });
     const { events, legend } = this.#part;
-    this.#part.marks.replaceChildren(...bars(this.#marks, this.#spans), ...shown);
+    this.#part.marks.replaceChildren(...bars(this.#marks, this.#spans, this.#attempts, this.#attempt), ...shown);
+    this.#part.attempts.hidden = this.#attempts.length < 2;
+    this.#part.tree.hidden ||= this.#part.attempts.hidden;
+    this.#part.attempts.setAttribute("aria-expanded", String(!this.#part.tree.hidden));
+    if (this.#attempt && !this.#part.tree.hidden) this.#tree?.draw(this.#of, this.#spans, this.#attempts, this.#attempt);
     for (const entry of legend.children) entry.toggleAttribute("hidden", !this.#marks.some(([, kind]) => kind === entry.getAttribute("data-kind")));
     // An open list keeps its place.
     if (document.activeElement === events && events.options.length === this.#marks.length + 1) return;

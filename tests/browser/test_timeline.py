@@ -12,8 +12,9 @@ import pytest
 
 import katana450
 from katana450.client import connect
+from katana450.extensions.recording.files.attempts import lasting_spans
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.spans import at_place, lasting_spans
+from katana450.extensions.recording.files.spans import at_place
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.maths.geometry.arrays import FloatArray
@@ -117,14 +118,34 @@ def place(page: ViserPage, value: float, name: str = NOW) -> None:
     )
 
 
-def check_kept(episodes: Path) -> None:
+def check_kept(page: ViserPage, episodes: Path) -> None:
     """Check that the only file of ``episodes`` is whole, and that a rewind left a part of it."""
+    page.page.get_by_text("Episode 1 is kept: see Episodes.").wait_for()
     (recording,) = map(katana450.open, episodes.glob("episode-*.mcap"))
     assert [episode.outcome.value for episode in recording.episodes] == ["failure"]
     assert recording.verify().identical
     with RecordingFile.open(recording.path) as file:
         first, second = lasting_spans(file, recording.start, recording.end)
     assert first.end < second.start
+
+
+def check_tree(page: ViserPage, run: PlaybackRun) -> None:
+    """Show, name, judge and compare the one of two attempts that was left."""
+    page.press_in_bar("Attempts, and what they continued from")
+    rows = page.page.locator("#timeline .tree .list button")
+    page.wait_until(lambda: rows.count() == 2, "both attempts")
+    rows.first.click()
+    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
+    page.page.get_by_label("Name of the attempt").fill("To the left")
+    page.page.keyboard.press("Enter")
+    page.page.get_by_label("Outcome of the attempt").select_option("failure")
+    page.wait_until(lambda: rows.first.get_attribute("class") == "failure", "its outcome")
+    page.page.get_by_label("Attempt to compare with").select_option("2")
+    page.page.get_by_role("cell", name="Ends apart: tool").wait_for()
+    page.wait_until(lambda: page.shows("/playback/1/arm"), "the second arm")
+    run.update()
+    first, second = run.attempts()
+    assert (first.name, first.outcome, second.parent) == ("To the left", "failure", 1)
 
 
 def test_past_is_shown_in_one_window_until_stop(
@@ -187,10 +208,9 @@ def test_past_is_shown_in_one_window_until_stop(
     page.page.locator("#timeline .marks b.left").wait_for(state="attached")
     # What was before and after it is an episode, without what it was set back over.
     page.page.get_by_label("Keep the selection as an episode").select_option("failure")
-    page.page.get_by_text("Episode 1 is kept: see Episodes.").wait_for()
-    page.keep(artefacts / "timeline-episode.png")
-    check_kept(folder.parent / "episodes")
-
+    check_kept(page, folder.parent / "episodes")
+    check_tree(page, run)
+    page.keep(artefacts / "timeline-attempts.png")
     place(page, 0.0)
     page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
     # Esc stops the arm, and shows it.
