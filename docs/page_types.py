@@ -14,6 +14,8 @@ import msgspec
 
 from docs.api import added_requests
 from katana450.arm.control.commands.checked import field_schema
+from katana450.extensions.programs.script.blocks import TextBlock
+from katana450.extensions.robot_choice.robot_routes import Choices
 from katana450.server.api import answers, requests
 
 FILE = Path(__file__).resolve().parents[1] / "tests" / "javascript" / "types.d.ts"
@@ -22,6 +24,9 @@ HEAD = """\
 // Written by `python -m docs.page_types` from the classes of the acts and answers.
 declare namespace Api {
 """
+
+OF_PAGE = (TextBlock, Choices)
+"""Answers to the page alone, beside those of the API."""
 
 LINE_LENGTH = 120
 
@@ -42,7 +47,8 @@ def content() -> str:
     """Return the content of the file."""
     acts = [*requests.CORE, *(kind for kinds in added_requests().values() for kind in kinds)]
     lines: list[str] = []
-    for title, kinds, omitted in (("Act", acts, True), ("Answer", answers.EVERY, False)):
+    groups = (("Act", acts, True), ("Answer", answers.EVERY, False), ("Page", OF_PAGE, True))
+    for title, kinds, omitted in groups:
         components = msgspec.json.schema_components(kinds, schema_hook=field_schema)[1]
         for name, schema in components.items():
             # Acts may leave out every default; of answers only the outer object does.

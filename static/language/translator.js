@@ -116,7 +116,7 @@ function translate(root) {
   for (let node = /** @type {Node | null} */ (root); node; node = nodes.nextNode()) {
     if (node instanceof Text) translateText(node);
     else if (node instanceof Element) translateAttributes(node);
-    if (node instanceof HTMLInputElement && node.matches("[role=combobox], [inputmode=decimal]:not([type=number])")) translateValue(node);
+    if (node instanceof HTMLInputElement && node.matches("[role=combobox], [inputmode=decimal]")) translateValue(node);
   }
 }
 

@@ -3,8 +3,7 @@ import { element, onChoice, styled } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { messageOf, queryOf, request } from "../server.js";
 
-/** @typedef {{ name: string, title: string, kind: "included" | "first" | "uploaded" | "gallery" | "other", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
-
+/** @typedef {Api.Choice} Robot */
 const box = element("robots", HTMLDialogElement);
 styled("robots.css", import.meta.url);
 
@@ -109,13 +108,12 @@ async function upload(file, main = "", isDropped = false) {
 
 search.addEventListener("input", draw);
 onChoice(field, ([file]) => upload(file));
-/** @param {Page.Status} status */
-function note({ robot }) {
+/** @param {Page.Status} status @param {Page.Status | null} before */
+function note({ robot }, before) {
   if (!robot) return;
-  const before = driven;
   driven = robot;
   if (robot.loading) report(`${robot.loading} is being read…`);
-  else if (robot.problem && robot.problem !== before?.problem) report(robot.problem);
+  else if (robot.problem && robot.problem !== before?.robot?.problem) report(robot.problem);
 }
 
 /** Show the choice, or hide it again. `options.file`: a description that was dropped on the page. @param {{ page: Page.Context, file?: File }} options */

@@ -1,20 +1,8 @@
 // Edits of a script by its blocks, which the server finds: the lines of a step are moved, copied, removed, commented out
 // or added. All other lines stay as they are.
 
-/**
- * A step as lines of the text, from 1; see `programs/script/blocks.py`.
- * @typedef {object} Block
- * @property {number} first @property {number} last @property {number} line @property {number} column
- * @property {number | null} indent column of its dash; null if it has no lines of its own
- * @property {number} group line at which its list begins @property {number} depth @property {string} title
- * @property {boolean} enabled @property {Value[]} [values] its own ones
- */
-/**
- * A value as a part of a line, see `programs/script/step_values.py`. A number has a `step`; what is `free` need not be one of
- * its options.
- * @typedef {{ name: string, line: number, column: number, end: number, text: string, about?: string, unit?: string, step?: number,
- *   options?: string[], free?: boolean, before?: string, after?: string }} Value what has a `before` is not in the text yet
- */
+/** @typedef {Api.TextBlock} Block a step as lines of the text, from 1 */
+/** @typedef {Api.StepValue} Value a part of a line; what has a `before` is not in the text yet */
 /** @typedef {{ line: number, indent: number, group: number, depth: number }} Place before a line, in a list */
 /** @typedef {{ text: string, line: number }} Edit a new text, and the line of the block in it */
 
@@ -26,7 +14,7 @@ function indexBehind(blocks, i) {
 
 /** Return whether the block `i` is the only step of its list, which needs one. @param {Block[]} blocks @param {number} i */
 export const isOnly = (blocks, i) =>
-  blocks[i].enabled && !blocks.some(({ group, enabled }, other) => other !== i && enabled && group === blocks[i].group);
+  blocks[i].enabled !== false && !blocks.some(({ group, enabled }, other) => other !== i && enabled && group === blocks[i].group);
 
 /** Return the index of the innermost block at a place; -1 without one. @param {Block[]} blocks @param {number} line */
 export const indexAt = (blocks, line, place = Infinity) =>

@@ -6,7 +6,7 @@ import { kept, nameIn, restored } from "./poses.js";
 const KEY = "katana450.teach";
 const MAX_CHANGES = 100;
 /** @type {Kept} */
-export const NEW = { name: "My script", times: 1, poses: [], text: null };
+export const NEW = { name: "My script", times: 1, poses: [], text: null, saved: null };
 
 export class Content {
   #storage;
@@ -50,9 +50,9 @@ export class Content {
     this.change({ poses: this.now.poses.map((pose) => (pose.id === id ? { ...pose, ...fields } : pose)) });
   }
 
-  /** Keep the text that is being edited, which has an undo of its own. @param {string} text */
-  keepText(text) {
-    this.#become({ ...this.now, text });
+  /** Keep what is no change to be undone, such as the text that is being edited, which has an undo of its own. @param {Partial<Kept>} fields */
+  keep(fields) {
+    this.#become({ ...this.now, ...fields });
   }
 
   undo() {

@@ -29,7 +29,7 @@ export class Editor {
     this.element.append(html("div", {}, this.#numbers, this.#area));
     this.#area.addEventListener("input", () => {
       this.#count();
-      sheet.content.keepText(this.text);
+      sheet.content.keep({ text: this.text });
       clearTimeout(this.#timer);
       this.#timer = setTimeout(() => this.check(), AFTER);
     });

@@ -1,6 +1,7 @@
 // The program that the server has: its steps, and the time of its preview that the scene shows.
 import { repeating, write } from "../dom.js";
 import { html, set } from "../instruments/shape.js";
+import { QUIETLY } from "../page/parts.js";
 import { request } from "../server.js";
 
 const EVERY = 300; // ms between two looks at the program
@@ -10,7 +11,7 @@ const WELL = ["running", "done"];
 const IN_USE = ["planning", "running", "paused", "blocked"];
 
 export class Plan {
-  #say;
+  #page;
   #sheet;
   /** @type {Api.ProgramPlan} */
   answer = { is: "program_plan" }; // of the server
@@ -21,9 +22,9 @@ export class Plan {
   #time = html("output");
   look = html("label", { id: "teach-look", title: "Shows arm, objects and water at this time, before the program runs" }, "Look at", this.#slider, this.#time);
 
-  /** @param {Page.Say} say @param {import("./teach.js").Teach} sheet */
-  constructor(say, sheet) {
-    this.#say = say;
+  /** @param {Pick<Page.Context, "say" | "store">} page @param {import("./teach.js").Teach} sheet */
+  constructor(page, sheet) {
+    this.#page = page;
     this.#sheet = sheet;
     this.#slider.addEventListener("input", () => {
       this.#pressed = performance.now();
@@ -31,7 +32,7 @@ export class Plan {
       if (this.#sender) return;
       this.#sender = setTimeout(() => {
         this.#sender = 0;
-        this.#say({ do: "preview", at: this.#slider.valueAsNumber });
+        this.#page.say({ do: "preview", at: this.#slider.valueAsNumber });
       }, SEND_EVERY);
     });
   }
@@ -63,18 +64,22 @@ export class Plan {
     this.answer = await answer.json();
     // A program that was continued has overcome what had ended it.
     if (this.isShown && WELL.includes(this.answer.program?.status ?? "")) this.#sheet.editor.explain([]);
+    const { program, look } = this.answer;
+    // The scene shows no preview of another text, and the bar no longer says what was wrong with it.
+    const isWrong = this.isShown === (look === null);
+    if (isWrong && !this.used && program?.by === this.#page.store.live?.name) this.#page.say({ do: "preview", at: this.isShown ? 0 : null, id: QUIETLY });
     this.draw();
     this.#sheet.drawPlan();
   }
 
   draw() {
-    const { seconds = 0, look = 0 } = this.isShown ? this.answer : /** @type {Partial<Api.ProgramPlan>} */ ({});
-    this.look.hidden = !seconds;
-    if (seconds && performance.now() - this.#pressed > HELD) {
-      set(this.#slider, "max", Math.ceil(10 * seconds) / 10);
-      this.#slider.value = String(look);
-      this.#tell(look, seconds);
-    }
+    const { seconds = 0, look } = this.isShown ? this.answer : /** @type {Partial<Api.ProgramPlan>} */ ({});
+    this.#slider.disabled = !seconds;
+    if (seconds && performance.now() - this.#pressed <= HELD) return;
+    set(this.#slider, "max", Math.ceil(10 * seconds) / 10 || 1);
+    this.#slider.value = String(look ?? 0);
+    if (seconds) this.#tell(look ?? 0, seconds);
+    else write(this.#time, "no preview");
   }
 
   /** @param {number} time @param {number} end */
@@ -86,14 +91,14 @@ export class Plan {
 
   /** Run the program from a step, from 1. @param {number} at */
   runFrom(at) {
-    this.#say({ do: "steer", order: "run", at });
+    this.#page.say({ do: "steer", order: "run", at });
   }
 
   /** Pause before all these steps; no longer, if it already does. @param {number[]} steps */
   toggle(steps) {
     const others = this.breakpoints.filter((step) => !steps.includes(step));
     const isOn = steps.every((step) => this.breakpoints.includes(step));
-    this.#say({ do: "breakpoints", steps: isOn ? others : [...others, ...steps] });
+    this.#page.say({ do: "breakpoints", steps: isOn ? others : [...others, ...steps] });
     this.read();
   }
 }

@@ -7,7 +7,7 @@
  * @property {string} id @property {number[]} joints @property {number | null} gripper @property {boolean} grips
  * @property {number} wait @property {number} speed @property {boolean} blend @property {string} picture
  */
-/** @typedef {{ name: string, times: number, poses: Pose[], text: string | null }} Kept */
+/** @typedef {{ name: string, times: number, poses: Pose[], text: string | null, saved: string | null }} Kept `saved`: the text as it was opened or saved */
 /** @typedef {{ joints: number[], gripper: number | null, wait: number, speed: number, blend: boolean }} TaughtPose */
 /** @typedef {{ name: string, times: number, poses: TaughtPose[] }} Taught */
 export const MAX_POSES = 100;
@@ -69,7 +69,7 @@ export function renamed(text, name) {
 
 // Return {text, poseAt}: the script, and a function that returns the index of the pose of a line
 // that counts from 1; null for a line of no pose.
-/** @param {Omit<Kept, "text">} script */
+/** @param {Pick<Kept, "name" | "times" | "poses">} script */
 export function scriptOf({ name, times, poses }) {
   const lines = [`name: ${JSON.stringify(name)}`, "steps:"];
   /** @type {(number | null)[]} */
@@ -102,9 +102,9 @@ export function scriptOf({ name, times, poses }) {
 /** @param {string} json @param {number} joints @returns {Kept} */
 export function restored(json, joints) {
   /** @type {Kept & { format: number }} */
-  const { format, name, times, poses, text } = JSON.parse(json);
+  const { format, name, times, poses, text, saved = null } = JSON.parse(json);
   if (format !== FORMAT || poses.some((pose) => pose.joints.length !== joints)) throw new Error("This is not what the page keeps.");
-  return { name, times, poses: poses.map((pose) => made(pose)), text };
+  return { name, times, poses: poses.map((pose) => made(pose)), text, saved };
 }
 
 /** Return `content` as a text to keep. @param {Kept} content */

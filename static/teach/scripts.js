@@ -50,6 +50,7 @@ export class Scripts {
     return this.#sheet.attempt(() => {
       const { name, text } = this.#sheet.script();
       save(new Blob([text], { type: "application/yaml" }), `${name}${FILE}`);
+      this.#sheet.content.keep({ saved: text });
       this.#sheet.report(`Saved as ${name}${FILE}.`);
     });
   }
@@ -62,6 +63,7 @@ export class Scripts {
       const isListed = [...this.open.options].some(({ value }) => value === name);
       if (isListed && !isAsked) throw new Error(`A script ${name} exists already. Press Save again to replace it.`);
       await request(`api/v1/scripts/${encodeURIComponent(name)}${isAsked ? "?replace" : ""}`, { method: "POST", body: text });
+      this.#sheet.content.keep({ saved: text });
       await this.list();
       this.#sheet.report(`Saved as ${name}. It is in the list of programs.`);
     });

@@ -1,8 +1,10 @@
 // The sheet of programs: one program at a time, as poses that are recorded and ordered, as its steps, or as text. It is
 // previewed, run and saved.
 import { element, first, write } from "../dom.js";
+import { numberBox } from "../instruments/parts.js";
 import { button, clamp, html, set } from "../instruments/shape.js";
 import { armWithStyle } from "../page/ready.js";
+import { numberIn } from "../number.js";
 import { messageOf, readState } from "../server.js";
 import { thumbnail } from "../viser/pictures.js";
 import { Content, NEW } from "./content.js";
@@ -10,7 +12,7 @@ import { Editor } from "./editor.js";
 import { draggable } from "./order.js";
 import { Plan } from "./plan.js";
 import { Player } from "./player.js";
-import { MAX_POSES, MAX_TIMES, fingersOf, poseOf, read, renamed, scriptOf } from "./poses.js";
+import { MAX_POSES, MAX_TIMES, fingersOf, nameIn, poseOf, read, renamed, scriptOf } from "./poses.js";
 import { Row } from "./row.js";
 import { Scripts } from "./scripts.js";
 import { Steps } from "./steps.js";
@@ -44,7 +46,7 @@ export class Teach {
   #step = button("Step", () => this.#player.start("step"), { id: "teach-step" });
   #undo = button("↶", () => this.content.undo(), { "aria-label": "Undo in Programs", title: "Undo in Programs" });
   #redo = button("↷", () => this.content.redo(), { "aria-label": "Redo in Programs", title: "Redo in Programs" });
-  #times = html("input", { type: "number", min: "1", max: MAX_TIMES, step: "1", inputmode: "numeric" });
+  #times = numberBox({ inputmode: "numeric" });
   #loop = html("label", {}, "Loop", this.#times, "times");
   #name = html("input", { maxlength: "40", spellcheck: "false", autocomplete: "off" });
   #views = {
@@ -68,7 +70,7 @@ export class Teach {
     this.#page = page;
     this.#arm = arm;
     this.content = new Content(page.kept, arm, () => this.#draw());
-    this.plan = new Plan(page.say, this);
+    this.plan = new Plan(page, this);
     this.#player = new Player(page, this, ID);
     const preview = button("Preview", () => this.#player.start(null), { title: "Plan it: show the path of the tool, and times and breakpoints of the steps" });
     const actions = html("div", { class: "bar" }, this.#play, this.#step, preview, html("div", { class: "history" }, this.#undo, this.#redo));
@@ -79,7 +81,7 @@ export class Teach {
     const scrolled = html("div", { class: "scrolled" }, this.#empty, this.#list, this.#steps.element, this.editor.element);
     this.#sheet.append(this.scripts.open, actions, this.#says, this.#other, this.plan.look, views, scrolled, this.editor.list, rest);
     element("dock", HTMLElement).prepend(this.#sheet);
-    this.#times.addEventListener("change", () => this.content.change({ times: clamp(Math.round(this.#times.valueAsNumber) || 1, 1, MAX_TIMES) }));
+    this.#times.addEventListener("change", () => this.content.change({ times: clamp(Math.round(numberIn(this.#times.value)) || 1, 1, MAX_TIMES) }));
     this.#name.addEventListener("change", () => {
       const [name, { text }] = [this.#name.value.trim() || NEW.name, this.content.now];
       this.content.change({ name, text: text === null ? null : renamed(text, name) });
@@ -249,22 +251,37 @@ export class Teach {
     return `joints: [${poseOf(await this.#state(), this.#arm, "").joints.join(", ")}]`;
   }
 
+  // Whether what the sheet shows differs from what was opened or saved.
+  get #isEdited() {
+    return this.shownText !== this.content.now.saved;
+  }
+
+  // Return how to get back the edits that the next program replaces; empty without some.
+  #wayBack() {
+    return this.#isEdited ? ` Undo brings back your edits of ${this.content.now.name}.` : "";
+  }
+
   // Show an empty list of poses.
   begin() {
+    const wayBack = this.#wayBack();
     this.#view = "poses";
     this.content.change(NEW);
-    this.report("");
+    this.report(`New poses.${wayBack}`);
   }
 
   /** Show a script: as poses if it has only these, otherwise its steps, or its text if this has errors. @param {string} text @param {string} name */
   async load(text, name) {
+    const wayBack = this.#wayBack();
     this.editor.text = text;
-    this.#view = "steps";
-    this.content.change({ text: this.editor.text, name: name.slice(0, 40) });
     const reading = await this.editor.check();
-    if (reading?.taught) return this.#takeTaught({ ...reading.taught, name: this.content.now.name });
-    this.#see(reading?.problems.length && !reading.blocks ? "text" : "steps");
-    this.report(reading?.problems.length ? ERRORS : `${name} is opened.`);
+    const opened = { text: this.editor.text, name: nameIn(text) ?? name.slice(0, 40) };
+    if (reading?.taught) this.#takeTaught({ ...reading.taught, name: opened.name });
+    else {
+      this.#view = reading?.problems.length && !reading.blocks ? "text" : "steps";
+      this.content.change(opened);
+    }
+    this.content.keep({ saved: this.shownText });
+    if ((reading?.taught?.poses.length ?? 0) <= MAX_POSES) this.report(reading?.problems.length ? ERRORS : `${name} is opened.${wayBack}`);
   }
 
   // Display
@@ -306,12 +323,12 @@ export class Teach {
     this.#add.hidden = this.#view !== "poses";
     // A pose may be several steps, and Go moves to one of them.
     this.#step.hidden = this.#view === "poses";
-    write(this.scripts.shown, name);
+    write(this.scripts.shown, this.#isEdited ? `${name}, edited` : name);
     this.plan.draw();
     this.drawPlan();
     this.#loop.hidden = text !== null;
     for (const [view, control] of Object.entries(this.#views)) set(control, "aria-pressed", view === this.#view);
-    if (this.#times !== focused || this.#times.valueAsNumber !== times) this.#times.value = String(times);
+    if (this.#times !== focused || numberIn(this.#times.value) !== times) this.#times.value = String(times);
     if (this.#name !== focused || this.#name.value.trim() !== name) this.#name.value = name;
     set(this.#undo, "aria-disabled", !this.content.past.length);
     set(this.#redo, "aria-disabled", !this.content.future.length);

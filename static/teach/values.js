@@ -1,6 +1,8 @@
 // The values of a step or a pose, each in a field.
 import { write } from "../dom.js";
+import { numberBox } from "../instruments/parts.js";
 import { button, clamp, html, set } from "../instruments/shape.js";
+import { notNumber, numberIn } from "../number.js";
 import { showToast } from "../page/words.js";
 
 /** @typedef {Omit<import("./blocks.js").Value, "line" | "column" | "end"> & { line?: number, column?: number, low?: number, high?: number }} Value */
@@ -41,26 +43,18 @@ export class Values {
 
   /** @param {Value} value @param {number} i */
   #add({ name, options = [], free, step, low = -Infinity, high = Infinity }, i) {
-    // The browser writes numbers in its own language, which need not be that of the page.
-    const box = () => html("input", step ? { type: "text", inputmode: "decimal", autocomplete: "off" } : { spellcheck: "false", autocomplete: "off", autocapitalize: "off" });
+    const box = () => (step ? numberBox({}, step) : html("input", { spellcheck: "false", autocomplete: "off", autocapitalize: "off" }));
     const input = options.length && !free ? html("select", {}, ...options.map((word) => new Option(word))) : box();
     const [unit, why] = [html("span"), html("em")];
     this.#fields[i] = { input, unit, why, text: "", name };
     input.addEventListener("change", () => {
       const words = input.value.trim();
-      const value = clamp(Number(words.replace(",", ".")), low, high);
+      const value = clamp(numberIn(words), low, high);
       const isWrong = !words || (step && Number.isNaN(value));
       input.value = isWrong ? this.#fields[i].text : step ? String(value) : words;
       if (!isWrong) this.#change(i, input.value);
-      else if (step) showToast(`${name}: ${words || "nothing"} is not a number. It was not sent.`);
+      else if (step) showToast(notNumber(name, words));
     });
-    input.onkeydown = (event) => {
-      const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
-      if (!step || !sign) return;
-      event.preventDefault();
-      input.value = String(Number((Number(input.value.replace(",", ".")) + sign * step).toFixed(6)));
-      input.dispatchEvent(new Event("change"));
-    };
     const words = (free ? options : []).map((word) => button(word, () => this.#change(i, word)));
     return html("div", {}, html("label", {}, html("span", {}, name), input, unit), ...words, why);
   }

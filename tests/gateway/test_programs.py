@@ -190,6 +190,8 @@ def test_plan_has_the_steps_and_the_time_that_is_looked_at(ready: Client) -> Non
     assert [step.mark for step in plan.steps] == ["", "shown", ""]
     ready.ask(Preview(at=1e9))
     assert ready.query(answers.ProgramPlan).look == plan.seconds
+    ready.ask(Preview(at=None))
+    assert ready.query(answers.ProgramPlan).look is None
     ready.ask(Steer(order=ProgramOrder.RUN))
     wait(ready, lambda status: status.step == 2)
     with pytest.raises(RefusedError, match="the arm itself shows it"):

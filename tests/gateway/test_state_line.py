@@ -19,7 +19,7 @@ from katana450.arm.control.state.state import Finding, Reason, Status
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.server.page_state import ENDS, duration
 from katana450.maths.collision.engine import Contact
-from katana450.server.api.program_requests import ProgramOrder
+from katana450.server.api.program_requests import Preview, ProgramOrder
 from tests.gateway.client import Control
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import Staged
@@ -126,6 +126,15 @@ def test_end_of_a_program_is_told_until_the_next_command(table: Staged) -> None:
     shown = table.bar(owner)
     assert (shown["mood"], shown["headline"]) == ("limited", "Cannot run: the script")
     assert "999" in shown["why"]
+    # It may be mended, or another text is edited.
+    wrong = table.arm.rest
+    table.arm.rest = replace(wrong, grip=0.1)
+    assert table.bar(owner)["headline"] == "On target"
+    table.arm.rest = wrong
+    assert table.bar(owner)["headline"] == "Cannot run: the script"
+    table.programs.handle(owner, Preview(at=None))
+    assert table.bar(owner)["headline"] == "On target"
+    table.plan(owner, "steps:\n  - joints: [20, -60, 80, 8, 999]\n")
     # As the planning worker reports a motion.
     table.programs.redirected()
     assert table.bar(owner)["headline"] == "On target"

@@ -26,6 +26,9 @@ declare namespace Api {
   interface Branches { is: "branches"; id?: number | string | null; choices: BranchOption[]; }
   interface Breakpoints { do: "breakpoints"; id?: number | string | null; revocations?: number | null;
     made?: number | null; steps: number[]; }
+  interface Choice { name: string; title: string; kind: string; maker?: string; licence?: string;
+    arguments?: Record<string, string>; }
+  interface Choices { robots: Choice[]; }
   interface ChooseRobot { do: "choose_robot"; robot: string; arguments?: Record<string, string> | null;
     id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface ClearStop { do: "clear_stop"; id?: number | string | null; revocations?: number | null;
@@ -93,6 +96,7 @@ declare namespace Api {
     revocations?: number | null; made?: number | null; }
   interface Orient { do: "orient"; R: number[][]; frame?: Frame; id?: number | string | null;
     revocations?: number | null; made?: number | null; wait?: number | null; }
+  type Page = Choices | TextBlock;
   interface PartRefusal { part: number; command: string; why: string; }
   interface Pause { do: "pause"; id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface Place { do: "place"; id?: number | string | null; revocations?: number | null; made?: number | null;
@@ -104,13 +108,13 @@ declare namespace Api {
   interface Position { do: "position"; p: number[]; frame?: Frame; id?: number | string | null;
     revocations?: number | null; made?: number | null; wait?: number | null; }
   interface Preview { do: "preview"; id?: number | string | null; revocations?: number | null; made?: number | null;
-    at: number; }
+    at: number | null; }
   type Priority = "orientation" | "pose" | "position" | "position and pitch";
   interface Program { do: "program"; id?: number | string | null; revocations?: number | null; made?: number | null;
     text: string; more?: boolean; speed?: number; }
   type ProgramOrder = "continue" | "end" | "pause" | "resume" | "rewind" | "run" | "step";
   interface ProgramPlan { is: "program_plan"; id?: number | string | null; text?: string; program?: Progress | null;
-    steps?: ProgramStep[]; seconds?: number; look?: number; }
+    steps?: ProgramStep[]; seconds?: number; look?: number | null; }
   interface ProgramStep { name: string; seconds: number; mark: string; predicted: boolean; line: number; column: number;
     }
   interface Progress { name: string; by: string; status: string; step: number; steps: number; line: number;
@@ -155,9 +159,13 @@ declare namespace Api {
     wait?: number | null; order: ProgramOrder; at?: number | null; }
   interface StepTool { do: "step_tool"; by: number[]; frame?: JogFrame; id?: number | string | null;
     revocations?: number | null; made?: number | null; wait?: number | null; }
+  interface StepValue { name: string; line: number; column: number; end: number; text: string; about?: string;
+    unit?: string; step?: number; options?: string[]; free?: boolean; before?: string; after?: string; }
   interface Stop { do: "stop"; id?: number | string | null; revocations?: number | null; made?: number | null;
     press?: string | null; }
   interface Take { do: "take"; id?: number | string | null; revocations?: number | null; made?: number | null; }
+  interface TextBlock { first: number; last: number; line: number; column: number; indent: number | null; group: number;
+    depth: number; title: string; enabled?: boolean; values?: StepValue[]; }
   interface Tool { do: "tool"; name: string; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
   interface Touch { preload: number; force_limit: number; fingers: FingerForce[]; }

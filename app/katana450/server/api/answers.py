@@ -116,14 +116,14 @@ class ProgramPlan(Answer, frozen=True, kw_only=True):
         program: Its progress, as in the state; null before the first one.
         steps: Its steps in their order, with those of all alternatives.
         seconds: Duration of its preview [s]; 0 while there is none.
-        look: Time of the preview that the scene shows [s]; 0 for none.
+        look: Time of the preview that the scene shows [s]; 0 for none, and None if it is hidden.
     """
 
     text: str = ""
     program: Progress | None = None
     steps: tuple[ProgramStep, ...] = ()
     seconds: float = 0.0
-    look: float = 0.0
+    look: float | None = 0.0
 
 
 class Margins(msgspec.Struct, frozen=True, kw_only=True):

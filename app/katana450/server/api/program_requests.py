@@ -91,12 +91,13 @@ class Preview(Request, frozen=True, kw_only=True):
     """Show arm, objects and water at a time of the planned program in the scene, before it runs.
 
     Attributes:
-        at: [s] Time from the beginning of the program; 0 shows none.
+        at: [s] Time from the beginning of the program; 0 shows only its path. None hides the path
+            too, and the reason why the planning failed, because another text is being edited.
     """
 
     traits: ClassVar[Traits] = Traits(extension=True)
 
-    at: Annotated[float, Meta(ge=0.0)]
+    at: Annotated[float, Meta(ge=0.0)] | None
 
 
 REQUESTS = (Program, Steer, Breakpoints, Preview)

@@ -310,7 +310,7 @@ class ProgramPreview:
     def _look(self) -> None:
         """Show the newest time; of several requests that waited, all show the last one."""
         try:
-            self._preview.look(self._runner.look_time)
+            self._preview.look(self._runner.look_time or 0.0)
         except Exception:
             log.exception("The preview met an error.")
 
@@ -318,7 +318,7 @@ class ProgramPreview:
         """Draw a new program, and hide the preview once it runs or the arm is driven after it."""
         program, has_begun = self._runner.drawn, self._runner.begun
         if program is not self._drawn or (self._begun and not has_begun):
-            self._drawn = program
+            self._drawn, self._begun = program, False
             self._preview.show(program, self._state())
         if has_begun and not self._begun:
             self._preview.begin()

@@ -189,6 +189,12 @@ class ProgramPlanner:
         """The planned program."""
         return None if self.planning is None else self.planning.program
 
+    def is_void(self, state: State) -> bool:
+        """Return whether the planning failed in another situation than that of ``state``."""
+        planning = self.planning
+        has_failed = planning is not None and planning.refused is not None and not planning.program
+        return has_failed and planning is not None and bool(planning.changed_to(state))
+
     @property
     def text(self) -> str:
         """The script that was planned last; "" before the first one."""

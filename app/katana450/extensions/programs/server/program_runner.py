@@ -71,7 +71,7 @@ class ProgramRunner(Runner):
         self._runs_as: ProgramParticipant | None = None
         self._run: Run | None = None
         # The program whose preview was looked at last, the time [s], and by whom.
-        self._looked: tuple[Program | None, float, Participant | None] = None, 0.0, None
+        self._looked: tuple[Program | None, float | None, Participant | None] = None, 0.0, None
         self.show_preview: Callable[[], object] = lambda: None
         """Called in the server's thread when ``look_time`` has changed by a request."""
         self.follow_run: FollowRun = lambda *_: None
@@ -89,8 +89,9 @@ class ProgramRunner(Runner):
 
     @property
     def drawn(self) -> Program | None:
-        """The program whose path is drawn; None once the owner of a program at rest has left."""
-        return self.program if self.running or self._owner.is_here else None
+        """The program whose path is drawn; None at rest, if its owner has left or hides it."""
+        is_drawn = self.look_time is not None and self._owner.is_here
+        return self.program if self.running or is_drawn else None
 
     @property
     def begun(self) -> bool:
@@ -274,39 +275,47 @@ class ProgramRunner(Runner):
 
     def plan(self) -> answers.ProgramPlan:
         """Return the present or last program with its steps."""
-        program, progress = self.program, self.progress()
+        program, progress, look = self.program, self.progress(), self.look_time
         if program is None:
-            return answers.ProgramPlan(text=self.planner.text, program=progress)
-        look = self.look_time
+            return answers.ProgramPlan(text=self.planner.text, program=progress, look=look)
         return answers.ProgramPlan(
             text=self.planner.text,
             program=progress,
-            steps=planned_steps(steps_of(program), progress, look),
+            steps=planned_steps(steps_of(program), progress, look or 0.0),
             seconds=0.0 if self.begun else program.preview_time,
             look=look,
         )
 
     @property
-    def look_time(self) -> float:
-        """Time [s] of the preview that the scene shows; 0 for none, as while the program runs."""
+    def look_time(self) -> float | None:
+        """Time [s] of the preview that the scene shows; 0 for none, None if it is hidden."""
         program, t, _ = self._looked
-        return t if program is self.program and not self.begun else 0.0
+        if program is not self.program or self.running:
+            return 0.0
+        return 0.0 if self.begun and t is not None else t
 
-    def _look_at(self, participant: Participant, t: float) -> None:
-        """Show the time ``t`` [s] of the preview. Raises LeaseError if there is none."""
+    def _look_at(self, participant: Participant, t: float | None) -> None:
+        """Show the time ``t`` [s] of the preview, or hide it. Raises LeaseError without one."""
         check_may_drive(participant.person)
         if self.running:
             raise LeaseError("The program runs, and the arm itself shows it.")
-        program = self.planner.require().program
-        assert program is not None
-        if program.preview_time <= 0.0 or self.begun:
-            raise LeaseError("There is no preview. Plan the program from its beginning first.")
-        self._looked = program, min(t, program.preview_time), participant
+        if t:
+            program = self.planner.require().program
+            assert program is not None
+            if program.preview_time <= 0.0 or self.begun:
+                raise LeaseError("There is no preview. Plan the program from its beginning first.")
+            t = min(t, program.preview_time)
+        else:
+            self._owner.check_may_steer(participant.person)
+            # The end of a run is still news while another text is edited.
+            self._is_news = self._is_news and (t is not None or self.begun)
+        self._looked = self.program, t, participant
         self.show_preview()
 
     def status_line(self, state: State, line: StatusLine, reader: Person | None) -> StatusLine:
         """Return the line for the program in place of ``line``."""
-        news = RunNews(self._run, reader) if self._is_news else None
+        is_news = self._is_news and not self.planner.is_void(state)
+        news = RunNews(self._run, reader) if is_news else None
         return page_state.status_line(state, line, self.progress(), news, waits=self.waits)
 
     def names(self, person: Person) -> bool:
