@@ -1,16 +1,13 @@
 // Keep arm and gizmo in the picture. If the requested view would cut them off, look in the same
 // direction from farther away. Fit again when the picture changes its size, unless the person has
 // turned the camera since.
-import { drawing, node, viewer, viewsIn, world } from "./viser.js";
+import { drawing, missing, node, viewer, viewsIn, world } from "./viser.js";
 
 const FILLED = 0.9; // maximum fraction of the picture's width and height for arm and gizmo
 const SAME = 1e-3; // m, below which two views count as equal
 const AGAIN = 200; // ms
-const STEADY = 3; // equal counts of shapes in a row after which all count as loaded
-const TRIES = 100;
 const NODES = ["/arm", "/target/move"];
 
-const given = () => new URLSearchParams(location.search).has("initialCameraPosition");
 /** @type {Page.View | null} */
 let base = null; // requested {position, look_at}; m, in viser's world
 /** @type {Page.View | null} */
@@ -25,7 +22,7 @@ const root = () => world().matrixWorld;
 /** @param {number[]} xyz */
 const vector = ([x, y, z]) => drawing().camera.position.clone().set(x, y, z);
 /** Return whether two views are the same. @param {Page.View} a @param {Page.View} b */
-export const isSame = (a, b) =>
+const isSame = (a, b) =>
   /** @type {const} */ (["position", "look_at"]).every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < SAME));
 
 // Return the corners of the bounding boxes of all shapes of arm and gizmo, in viser's world.
@@ -115,11 +112,15 @@ for (const kind of ["pointerdown", "pointerup", "pointercancel"])
     if (!pressed && late) refit();
   }, { capture: true });
 
-/** Note the views that the server sets, and fit views that a person chose before viser gets them. @param {ViserPage.Message[]} messages */
-export function hear(messages) {
+// Note the views that the server sets, and fit views that a person chose before viser gets them. `last` takes the place of
+// the first view.
+/** @param {ViserPage.Message[]} messages @param {Page.View | null} last */
+export function hear(messages, last) {
   const [position, target] = viewsIn(messages);
   if (position?.initial ?? target?.initial) {
-    if (chosen || given()) return;
+    if (last && position) position.position = last.position;
+    if (last && target) target.look_at = last.look_at;
+    if (chosen || last) return;
     base = {
       position: position?.position ?? base?.position ?? [],
       look_at: target?.look_at ?? base?.look_at ?? [],
@@ -161,13 +162,9 @@ export const choose = (view) => (riding = view === "Tool");
 export function begin() {
   if (begun) return;
   begun = true;
-  let [count, steady, tries] = [0, 0, 0];
   const timer = setInterval(() => {
-    const before = count;
-    count = viewer()?.cameraControl && node("") ? corners().length : 0;
-    steady = count && count === before ? steady + 1 : 0;
-    if (steady < STEADY && ++tries < TRIES) return;
+    if (!viewer()?.cameraControl || !node("") || missing().length) return;
     clearInterval(timer);
-    if (count) new ResizeObserver(refit).observe(drawing().canvas);
+    new ResizeObserver(refit).observe(drawing().canvas);
   }, AGAIN);
 }

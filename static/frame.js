@@ -10,9 +10,7 @@ import * as Viser from "./viser.js";
 import * as Names from "./viser/names.js";
 
 const REPORT_EVERY = 50; // ms
-const AGAIN = 100; // ms
-const TRIES = 100; // attempts to restore the camera
-const STEADY = 1000; // ms for which viser must keep the restored camera
+const CAMERA = ["initialCameraPosition", "initialCameraLookAt"]; // parameters of the address
 /** The properties of the floor and the file of the sky, for each theme. @type {Record<Theme.Name, ViserPage.Theme>} */
 const ROOMS = JSON.parse(document.currentScript?.dataset.rooms ?? "{}");
 const outer = window.parent === window ? null : window.parent;
@@ -35,13 +33,8 @@ sheet.replaceSync(`${Names.STEADY} ${Names.HELD}
     input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }`);
 document.adoptedStyleSheets.push(sheet);
 
-/** @type {ViserPage.View | null} */
-let camera = null; // this person's last view
-/** @type {ViserPage.View | null} */
-let kept = null; // the view to restore after a reconnection; null when done
-let tries = 0;
-/** @type {number | null} */
-let steadySince = null; // ms, since when viser has the kept view; null while it has another
+/** @type {Page.View | null} */
+let camera = null; // this person's last view, at first that of the address
 /** @type {Map<string, ViserPage.Message>} */
 const themed = new Map(); // the last message of each type that depends on the theme
 let loaded = false; // whether the panel of this connection has arrived
@@ -66,27 +59,6 @@ function report(connection) {
   if (document.hidden) soon();
   else requestAnimationFrame(soon);
 }
-
-// viser sets its first view after a reconnection, and again when it has drawn the scene, which on a
-// slow page is after our camera is set. Therefore the camera is set until it stays.
-/** @param {ViserPage.Connection} connection */
-function restore(connection) {
-  if (kept && performance.now() - (steadySince ?? Infinity) > STEADY) kept = null;
-  if (kept && steadySince === null && (tries += 1) > TRIES) kept = null;
-  if (!kept) return;
-  if (steadySince === null) connection.show(Viser.viewing(kept));
-  setTimeout(() => restore(connection), AGAIN);
-}
-
-// A person who turns the camera meanwhile keeps that view.
-for (const kind of ["pointerdown", "wheel"])
-  window.addEventListener(
-    kind,
-    ({ target }) => {
-      if (tries && target instanceof HTMLCanvasElement) kept = null;
-    },
-    { capture: true, passive: true },
-  );
 
 /** The hint of a control goes when the control is used, and may return when the pointer has left it. @type {Element | null} */
 let used = null;
@@ -118,8 +90,7 @@ function changeTheme(connection) {
 /** @param {ViserPage.View} view */
 function noteView(view) {
   outer?.katana?.turned?.();
-  if (!kept) camera = view;
-  else steadySince = Fit.isSame(kept, view) ? (steadySince ?? performance.now()) : null;
+  if (loaded) camera = view;
 }
 
 Viser.interceptMessages({
@@ -147,9 +118,6 @@ Viser.interceptMessages({
     document.documentElement.dataset.loading = "";
     loaded = false;
     seen = 0;
-    kept = camera;
-    tries = 0;
-    steadySince = null;
   },
   receives(messages, connection) {
     Fields.hear(messages);
@@ -159,12 +127,9 @@ Viser.interceptMessages({
     if (Viser.isDrawn() || document.hidden) report(connection);
     const ready = Viser.replayed(messages);
     applyTheme(messages);
-    Fit.hear(messages);
+    Fit.hear(messages, camera);
     if (Viser.controlsIn(messages)) loaded = true;
     if (ready) Fit.begin();
-    if (!kept || tries > 0 || !ready) return;
-    tries = 1;
-    setTimeout(() => restore(connection), AGAIN);
   },
 });
 
@@ -172,7 +137,12 @@ Viser.interceptMessages({
 async function entered() {
   if (!outer) return;
   if (!outer.katana) await new Promise((done) => outer.addEventListener("DOMContentLoaded", done));
-  history.replaceState(null, "", `?${await outer.katana?.entered}`);
+  const parameters = (await outer.katana?.entered) ?? new URLSearchParams();
+  const [position, look_at] = CAMERA.map((name) => parameters.get(name)?.split(",").map(Number));
+  if (position && look_at) camera = { position, look_at };
+  // viser would return to these after each lost connection.
+  for (const name of CAMERA) parameters.delete(name);
+  history.replaceState(null, "", `?${parameters}`);
 }
 
 window.katanaScene = { ...Names, ...Viser, ...Fit };

@@ -31,6 +31,9 @@ export function drawing() {
 /** Return the three.js object of a node; "" is viser's world. @param {string} name */
 export const node = (name) => drawing().nodeRefFromName[name];
 
+/** Return the name of the node that is an object of three.js; empty for another. @param {Three.Object3D} object */
+export const nameOf = (object) => Object.entries(drawing().nodeRefFromName).find(([, other]) => other === object)?.[0] ?? "";
+
 // Return viser's world.
 export function world() {
   const root = node("");
@@ -238,12 +241,6 @@ export const viewsIn = (messages) =>
   ["SetCameraPositionMessage", "SetCameraLookAtMessage"].map((type) =>
     messages.findLast((message) => message.type === type),
   );
-
-/** Return messages that give the page's camera a view of `viewOf`. @param {ViserPage.View} view */
-export const viewing = ({ position, look_at }) => [
-  { type: "SetCameraLookAtMessage", look_at, initial: false },
-  { type: "SetCameraPositionMessage", position, initial: false },
-];
 
 /** Return whether the server's whole scene has arrived with `messages`. @param {ViserPage.Message[]} messages */
 export const replayed = (messages) => messages.some(({ type }) => type === "ReplayDoneMessage");

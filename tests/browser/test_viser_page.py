@@ -217,12 +217,6 @@ def test_page_tells_and_takes_views(page: ViserPage) -> None:
         ask(page, f"Viser.send({{ ...{look}, fov: 0.5 }})")
         # The camera, which may still turn to the side, sends others after it.
         assert ask(page, "harness.sent.some(({ body }) => body.fov === 0.5)")
-    with part("viewing"):
-        view = {"position": [0.0, 1.5, 1.0], "look_at": [0, 0, 0]}
-        page.frame.evaluate("(view) => tapped.line.show(Viser.viewing(view))", view)
-        page.wait_until(
-            lambda: np.allclose(eye(page), view["position"], atol=1e-3), "the view that was shown"
-        )
 
 
 def test_page_shows_a_hidden_node_by_itself(page: ViserPage) -> None:
