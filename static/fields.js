@@ -1,5 +1,6 @@
 // Number boxes of viser's panel. viser sends each keystroke, so the arm would move to 5, 50 and 500.
 // Here typed text is a draft, which viser gets on Enter or when the box is left.
+import { notNumber, numberIn } from "./number.js";
 import * as Viser from "./viser.js";
 import { NUMBER_BOX } from "./viser/names.js";
 
@@ -32,10 +33,10 @@ function range(field) {
 
 /** Return why the draft cannot be sent; empty if it can. @param {HTMLInputElement} field */
 function objection(field) {
-  const { low, high } = range(field);
-  const value = draft(field) === "" ? NaN : Number(draft(field));
-  if (!Number.isFinite(value)) return "is not a number";
-  return value < low || value > high ? `is not between ${low} and ${high}` : "";
+  const { label, low, high } = range(field);
+  const value = numberIn(draft(field));
+  if (!Number.isFinite(value)) return notNumber(label, field.value);
+  return value < low || value > high ? `${label}: ${field.value} is not between ${low} and ${high}. It was not sent.` : "";
 }
 
 /** @param {HTMLInputElement} field @param {boolean} invalid */
@@ -51,8 +52,11 @@ function restore(field) {
 function commit(field) {
   if (field.value === Viser.shownIn(field)) return mark(field, false);
   const why = objection(field);
-  mark(field, why !== "");
-  if (why) return tell(`${range(field).label}: ${field.value || "nothing"} ${why}. It was not sent.`);
+  if (why) {
+    restore(field);
+    if (field === box) field.select();
+    return tell(why);
+  }
   sending = true;
   Viser.type(field, draft(field));
   sending = false;
@@ -62,8 +66,8 @@ function commit(field) {
 function leave(field) {
   box = null;
   // A value typed before a stop must not be sent after Clear stop, which was clicked to leave the box.
-  if (!stopped()) commit(field);
-  if (stopped() || field.getAttribute("aria-invalid")) restore(field);
+  if (stopped()) restore(field);
+  else commit(field);
 }
 
 /** @param {HTMLInputElement} field @param {number} sign */

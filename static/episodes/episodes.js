@@ -1,6 +1,8 @@
 // Episodes: REC, the judgement of attempts, and their list. Loaded when the server records.
 import { element, styled, write } from "../dom.js";
+import { numberBox } from "../instruments/parts.js";
 import { button, html } from "../instruments/shape.js";
+import { numberIn } from "../number.js";
 import { messageOf, request } from "../server.js";
 
 /** @typedef {Page.Outcome} Outcome */
@@ -200,25 +202,24 @@ export class Episodes {
     row.addEventListener("toggle", () => this.#open[row.open ? "add" : "delete"](number));
     row.addEventListener("toggle", () => row.contains(document.activeElement) && row.scrollIntoView({ block: "nearest" }));
     if (!this.#may) return html("li", {}, row);
-    /** @param {string} label @param {Record<string, string | number>} attributes @param {(value: string) => void} change */
-    const field = (label, attributes, change) => {
-      const input = html("input", attributes);
+    /** @param {string} label @param {HTMLInputElement} input @param {(value: string) => void} change */
+    const field = (label, input, change) => {
       input.addEventListener("change", () => change(input.value));
       return html("label", {}, label, input);
     };
     /** @param {object} body */
     const ask = (body) => this.#ask({ ...body, number });
     /** @param {number} value */
-    const seconds = (value) => ({ type: "text", inputmode: "decimal", autocomplete: "off", value: value.toFixed(1) });
+    const seconds = (value) => numberBox({ value: value.toFixed(1) }, 0.1);
     const select = html("select", {}, ...Object.entries(OUTCOMES).slice(0, outcome === "unfinished" ? 4 : 3).map(([value, words]) => html("option", { value, ...(value === outcome && { selected: "" }) }, words)));
     select.addEventListener("change", () => ask({ do: "judge", outcome: select.value }));
     const discard = button("Discard", () => ask({ do: "discard" }), { "data-key": `${number} kept` });
     row.append(
       html("label", {}, "Outcome", select),
-      field("Task", { maxlength: 200, value: task }, (value) => ask({ do: "describe", task: value })),
-      field("Note", { maxlength: 500, value: note }, (value) => ask({ do: "describe", note: value })),
-      field("From, s", seconds(start), (value) => ask({ do: "trim", start: Number(value), end })),
-      field("To, s", seconds(end), (value) => ask({ do: "trim", start, end: Number(value) })),
+      field("Task", html("input", { maxlength: 200, value: task }), (value) => ask({ do: "describe", task: value })),
+      field("Note", html("input", { maxlength: 500, value: note }), (value) => ask({ do: "describe", note: value })),
+      field("From, s", seconds(start), (value) => ask({ do: "trim", start: numberIn(value), end })),
+      field("To, s", seconds(end), (value) => ask({ do: "trim", start, end: numberIn(value) })),
       html("div", {}, discard, html("a", { "data-key": `${number} file`, href: `api/v1/episodes/${number}`, download: file }, `Download, ${size(bytes)}`)),
     );
     return html("li", {}, row);

@@ -1,4 +1,5 @@
 // Parts of instruments: buttons that stay pressed, and round scales.
+import { numberIn } from "../number.js";
 import { button, html, set } from "./shape.js";
 
 /** @typedef {import("./shape.js").Attributes} Attributes */
@@ -10,6 +11,19 @@ export function toggle(content, change, attributes = {}) {
     change(on);
   }, { "aria-pressed": false, ...attributes });
   return control;
+}
+
+/** Return a box for a number, which arrow keys change by `step`. @param {Attributes} attributes */
+export function numberBox(attributes = {}, step = 1) {
+  const box = html("input", { type: "text", inputmode: "decimal", autocomplete: "off", ...attributes });
+  box.addEventListener("keydown", (event) => {
+    const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+    if (!sign) return;
+    event.preventDefault();
+    box.value = String(Number((numberIn(box.value) + sign * step).toFixed(6)));
+    box.dispatchEvent(new Event("change"));
+  });
+  return box;
 }
 
 /** Return a labelled choice of a group; `act` is called when a person makes it. @param {string} name @param {string | number} value @param {string} label @param {boolean} checked */

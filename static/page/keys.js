@@ -41,11 +41,3 @@ export function keyHandler(parts, stop) {
     event.stopImmediatePropagation();
   };
 }
-
-// A comma in a number is its point, in every language of the browser.
-window.addEventListener("beforeinput", (event) => {
-  const { target, data } = event;
-  if (!(target instanceof HTMLInputElement && target.type === "number" && data?.includes(","))) return;
-  event.preventDefault();
-  document.execCommand("insertText", false, data.replace(",", "."));
-});

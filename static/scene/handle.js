@@ -2,7 +2,9 @@
 // steps, with Shift more finely, and a typed number takes it there. All of it changes the poses of viser's own messages,
 // which remain the only commands.
 import { sceneIn, write } from "../dom.js";
+import { numberBox } from "../instruments/parts.js";
 import { html, signed } from "../instruments/shape.js";
+import { numberIn } from "../number.js";
 import { isMesh } from "./glow.js";
 import { placeBeside } from "./place_near.js";
 
@@ -18,7 +20,6 @@ const FARTHEST = 1.5; // m; the server takes no larger coordinate
 const SIZE = "/size"; // end of the name of a node at a corner of a box, which changes its size
 const HANDLES = ["/target/move", "/target/elbow", "/handles"];
 const FADED = 0.25; // opacity of the other parts while one is under the pointer or dragged
-const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)$/;
 
 /**
  * `axis` is its own axis along which it moves, or about which it turns; null before it does. How far it is from its
@@ -69,7 +70,7 @@ export class Handle {
   // The state line and the panel say the same to screen readers.
   #label = html("p", { id: "handle-label", class: "scene-label", "aria-hidden": "true", hidden: "" });
   #what = html("label", { for: "handle-number" });
-  #number = html("input", { id: "handle-number", type: "text", inputmode: "decimal", autocomplete: "off", size: 7 });
+  #number = numberBox({ id: "handle-number", size: 7 });
   #unit = html("span");
   #form = html("form", { id: "handle-form", hidden: "" }, this.#what, this.#number, this.#unit);
 
@@ -170,15 +171,15 @@ export class Handle {
 
   // Send the handle of the drag to the typed number.
   #enter() {
-    const [drag, text] = [this.#typed, this.#number.value.trim().replace(",", ".").replace("−", "-")];
+    const drag = this.#typed;
     const { Start, Update, End } = drag?.sent ?? {};
     const { drawing, node, send } = sceneIn(this.#scene);
     const handle = drag && node(drag.name);
     if (!drag || drag.axis === null || !Update || !handle) return this.close();
-    const shown = Number(text) / (drag.turns ? DEGREES : 1000) - drag.lengths[drag.axis];
+    const shown = numberIn(this.#number.value) / (drag.turns ? DEGREES : 1000) - drag.lengths[drag.axis];
     const isPossible = Math.abs(shown) <= (drag.turns ? Math.PI : FARTHEST);
-    this.#number.ariaInvalid = String(!NUMBER.test(text) || !isPossible);
-    if (this.#number.ariaInvalid === "true") return;
+    this.#number.ariaInvalid = String(!isPossible);
+    if (!isPossible) return;
     drag.value = drag.shown = shown;
     put(handle.matrix, drag);
     take(Update, handle);
