@@ -9,17 +9,17 @@ let page;
 /** @type {Parts} */
 let parts;
 /** @typedef {Pick<import("./page/parts.js").Parts, "stage" | "teach" | "replay">} Parts those that are loaded later */
-/** @type {Record<Step, string[]>} */
-let changes = { undo: [], redo: [] }; // names of what can be undone and redone, the newest first
-let revocations = 0; // number of stops and changes of driver: an undo from before the next one is refused
 /** @type {number | undefined} */
 let leaving; // timer of the end of a drag
 
 /** @param {Step} what */
 function step(what) {
-  if (!page.store.up) return page.toast("No connection to the arm.");
-  if (changes[what].length) page.toast(`${what === "undo" ? "Undo" : "Redo"}: ${changes[what][0]}`);
-  page.say({ do: what, revocations, id: "undo" });
+  const { live } = page.store;
+  if (!live) return page.toast("No connection to the arm.");
+  const [change] = live[what] ?? [];
+  if (change) page.toast(`${what === "undo" ? "Undo" : "Redo"}: ${change}`);
+  // An undo from before a stop or a change of driver is refused.
+  page.say({ do: what, revocations: live.revocations, id: "undo" });
 }
 
 /** Return whether the key was handled. @param {KeyboardEvent} event */
@@ -40,13 +40,11 @@ export function key(event) {
 
 /** @param {Page.Status} status */
 function note(status) {
-  changes = { undo: status.undo ?? [], redo: status.redo ?? [] };
-  revocations = status.revocations;
-  const names = (changes.undo.length ? changes.undo : ["nothing yet"]).map(t);
+  const names = (status.undo?.length ? status.undo : ["nothing yet"]).map(t);
   const list = element("undoable", HTMLElement);
   if ([...list.children].map((entry) => entry.textContent).join() !== names.join())
     list.replaceChildren(...names.map((name) => Object.assign(document.createElement("li"), { textContent: name })));
-  for (const what of STEPS) element(what, HTMLButtonElement).disabled = !changes[what].length;
+  for (const what of STEPS) element(what, HTMLButtonElement).disabled = !status[what]?.length;
 }
 
 /** Return the point [x, y] of the table below the pointer; null if it is over something else. @param {DragEvent} event */

@@ -13,9 +13,9 @@ const ID = "name"; // id of the request for a name
 /** @type {Page.Context} */
 let page;
 let wanted = ""; // name that was sent and not answered yet
-let known = ""; // name that the server shows
-/** @type {Page.Robot | null} */
-let robot = null; // the robot that the server drives
+
+// The name that the server shows.
+const nameNow = () => page.store.status?.name ?? "";
 
 /** @param {string} words */
 const refuse = (words) => {
@@ -31,7 +31,7 @@ function ask(name) {
 
 function open() {
   element("phone", HTMLDialogElement).close();
-  field.value = t(known);
+  field.value = t(nameNow());
   theme.value = document.documentElement.dataset.theme === "dark" ? "Dark" : "Light";
   language.value = document.documentElement.lang;
   refuse("");
@@ -57,7 +57,7 @@ export function begin(context) {
   first("#who p", HTMLElement).addEventListener("click", toggle);
   element("own-name-form", HTMLFormElement).addEventListener("submit", (event) => {
     event.preventDefault();
-    ask(field.value === t(known) ? known : field.value);
+    ask(field.value === t(nameNow()) ? nameNow() : field.value);
   });
   theme.addEventListener("change", async () => (await import("./theme.js")).choose(theme.value));
   language.addEventListener("change", () => {
@@ -83,15 +83,10 @@ export async function chooseRobot(file) {
 
 // Take a status: all windows load again when the server has changed its robot, and a person whom the server has named
 // gets the kept name.
-/** @param {Page.Status} status */
-function note(status) {
-  if (status.robot) {
-    if (robot && robot.key !== status.robot.key) location.reload();
-    ({ robot } = status);
-  }
-  const { name } = status;
-  if (name === known) return;
-  known = name;
+/** @param {Page.Status} status @param {Page.Status | null} before */
+function note({ robot, name }, before) {
+  if (robot && before?.robot && before.robot.key !== robot.key) location.reload();
+  if (name === before?.name) return;
   const own = page.kept.getItem(NAME);
   // A server that was restarted has forgotten it.
   if (own && own !== name && /^Window \d+$/.test(name)) ask(own);

@@ -18,7 +18,6 @@ let file = null; // the last one that was chosen
 let main = ""; // the file to read in it, if it is a .zip file of several
 /** @type {string | null} */
 let placed = null; // the name of its object
-let chosen = ""; // the object that the sheet shows
 let fitted = false; // whether its scale was chosen to fit
 /** @type {[number, number] | null} */
 let where = null; // [x, y] of the point of the table on which the files were dropped
@@ -100,11 +99,7 @@ export function begin(context) {
   byId("save").addEventListener("click", saveScene);
   unit.addEventListener("change", () => add(true));
   // The text on an object goes with it.
-  window.addEventListener("chosen", (event) => {
-    const { detail } = /** @type {CustomEvent<string>} */ (event);
-    if (placed && chosen === placed && detail !== placed) report("");
-    chosen = detail;
-  });
+  window.addEventListener("selected", () => placed && page.store.object !== placed && report(""));
   onChoice(element("object-file", HTMLInputElement), take);
   onChoice(element("scene-file", HTMLInputElement), ([first]) => load(first));
 }
@@ -117,6 +112,7 @@ export async function show(shown) {
   if (!shown && !form) return;
   form ??= import("./objects/object.js").then(({ ObjectForm }) => new ObjectForm(page));
   (await form).watch(!byId("objects").hidden);
+  if (!shown) page.store.select("");
 }
 
 // Read files that were chosen or dropped, each of which is an object, or a scene or a robot in a .zip file. `at` is the

@@ -113,10 +113,8 @@ const opened = new MutationObserver(([{ target }]) => {
 for (const dialog of document.querySelectorAll("dialog")) opened.observe(dialog, { attributeFilter: ["open"] });
 
 // What is held when the stop is cleared must not move the arm, also where other people stopped and cleared it.
-let stopped = false;
-store.follow((status) => {
-  if (stopped || status.stopped) Jog.quiet();
-  stopped = Boolean(status.stopped);
+store.follow((status, before) => {
+  if (before?.stopped || status.stopped) Jog.quiet();
   element("gate", HTMLElement).hidden = true;
   store.proven = null;
   bar.draw();

@@ -1,6 +1,8 @@
 // The chosen object in the sheet of objects: its looks, size and place, what carries it, and the rule for the arm in a zone.
 import { byId, onClick, repeating, styled, write } from "../dom.js";
+import { numberBox } from "../instruments/parts.js";
 import { button, html } from "../instruments/shape.js";
+import { notNumber, numberIn } from "../number.js";
 import { mayDrive } from "../page/lease.js";
 import { readObjects } from "../server.js";
 
@@ -25,7 +27,7 @@ const NEW_PLANE = /** @type {Partial<Api.Place>} */ ({ shape: "plane", size: [0.
 const SIZES = { sphere: "Radius, mm", cylinder: "Radius × height, mm", vessel: "Radius × height, mm" };
 
 const PLACING = "#objects :is(#add, #add-box, #add-zone, #add-plane, #unit, #load)"; // what needs the arm, beside the chosen object
-const NUMBER = { type: "number", step: "any" };
+const NUMBER = { inputmode: "decimal" };
 
 /** Return the pose `T` turned by `angle` [degrees] about the vertical through it. @param {number[][]} T @param {number} angle */
 function turned(T, angle) {
@@ -45,13 +47,13 @@ export class ObjectForm {
   #remove = button("Remove", () => this.#act({ do: "remove", name: this.#name }));
   #colour = this.#input("Colour", { type: "color" }, (value) => ({ colour: value }));
   #opacity = this.#input("Opacity", { type: "range", min: 5, max: 100, step: 1 }, (value) => ({ opacity: Number(value) / 100 }));
-  #scale = this.#input("Scale", NUMBER, (value) => ({ scale: Number(value || NaN) }));
+  #scale = this.#input("Scale", NUMBER, (value) => ({ scale: numberIn(value) }));
   #size = this.#input("Size", { type: "text" }, (value) => ({ size: this.#sizeOf(value) }));
-  #place = ["x", "y", "z"].map((name, row) => this.#input(name, { ...NUMBER, "aria-label": name }, (value) => this.#moved(row, Number(value || NaN) / 1e3)));
+  #place = ["x", "y", "z"].map((name, row) => this.#input(name, { ...NUMBER, "aria-label": name }, (value) => this.#moved(row, numberIn(value) / 1e3)));
   #sizeLabel = html("span");
   #zone = html("select", {}, ...ZONES.map(([label, zone]) => new Option(label, zone)));
   #turn = this.#input("Turn", { type: "range", min: -180, max: 180, step: 1, "aria-label": "Turn" }, (value) => this.#turned(Number(value)));
-  #angle = this.#input("Turn", { ...NUMBER, "aria-label": "Turn, °" }, (value) => this.#turned(Number(value || NaN)));
+  #angle = this.#input("Turn", { ...NUMBER, "aria-label": "Turn, °" }, (value) => this.#turned(numberIn(value)));
   #hidden = this.#input("Hidden", { type: "checkbox" }, () => ({ hidden: this.#hidden.checked }));
   #percent = html("output");
   #why = html("p", { role: "status" });
@@ -67,7 +69,7 @@ export class ObjectForm {
     byId("which").after(this.element);
     /** @param {string} name @param {(Node | string)[]} content */
     const row = (name, ...content) => html("label", {}, html("span", {}, name), ...content);
-    this.#choice.addEventListener("change", () => this.#show(true));
+    this.#choice.addEventListener("change", () => page.store.select(this.#choice.value));
     this.#zone.addEventListener("change", () => this.#act({ do: "place", name: this.#name, zone: /** @type {Api.Zone} */ (this.#zone.value) }));
     onClick("add-box", () => this.#add("box", NEW_BOX));
     onClick("add-zone", () => this.#add("zone", NEW_ZONE));
@@ -87,10 +89,8 @@ export class ObjectForm {
       html("div", { role: "group", "aria-label": "Attach to" }, html("span", {}, "Attach to"), ...this.#mounts),
     );
     page.store.follow(() => this.#permit());
-    window.addEventListener("selected", (event) => {
-      const name = /** @type {CustomEvent<string>} */ (event).detail;
-      if (!this.#objects.some((object) => object.name === name)) return;
-      this.#choice.value = name;
+    window.addEventListener("selected", () => {
+      this.#choice.value = page.store.object;
       this.#show(true);
     });
   }
@@ -105,13 +105,13 @@ export class ObjectForm {
 
   /** Return a control that changes the object when it is used. @param {string} name @param {import("../instruments/shape.js").Attributes} attributes @param {(value: string) => Partial<Api.Place>} change */
   #input(name, attributes, change) {
-    const isTyped = attributes.type === "text" || attributes.type === "number";
-    const input = html("input", { name, ...attributes });
+    const isTyped = !attributes.type || attributes.type === "text";
+    const input = attributes.inputmode ? numberBox({ name, ...attributes }) : html("input", { name, ...attributes });
     const send = () => {
       this.#sender = 0;
       const fields = change(input.value);
       if (!Object.values(fields).flat(2).some(Number.isNaN)) return this.#act({ do: "place", name: this.#name, ...fields });
-      this.#page.toast(`${name}: ${input.value || "nothing"} is not a number. It was not sent.`);
+      this.#page.toast(notNumber(name, input.value));
       this.#show(true);
     };
     input.addEventListener(isTyped ? "change" : "input", () => {
@@ -125,7 +125,7 @@ export class ObjectForm {
   /** Return the lengths [m] in a text, at the scale 1. @param {string} text */
   #sizeOf(text) {
     const sides = text.split(/[×x;\s]+/).filter(Boolean);
-    return sides.map((side) => Number(side.replace(",", ".")) / 1e3 / (this.#object?.scale ?? 1));
+    return sides.map((side) => numberIn(side) / 1e3 / (this.#object?.scale ?? 1));
   }
 
   /** @param {string} word @param {Partial<Api.Place>} fields */
@@ -161,14 +161,15 @@ export class ObjectForm {
     for (const { name, overlap } of this.#objects) if (overlap && !before.some((other) => other.name === name && other.overlap)) this.#page.toast(overlap);
     const names = this.#objects.map(({ name }) => name);
     const added = before.length ? names.find((name) => !before.some((object) => object.name === name)) : undefined;
+    const { store } = this.#page;
     if (names.join("\n") !== before.map(({ name }) => name).join("\n")) {
-      const chosen = this.#name;
       this.#choice.replaceChildren(new Option("Choose an object", ""), ...names.map((name) => new Option(name)));
+      this.#choice.value = store.object;
       // None takes the place of one that is gone: its Remove would remove another.
-      this.#choice.value = added ?? (names.includes(chosen) || before.length ? chosen : names[0] ?? "");
-      if (this.#choice.selectedIndex < 0) this.#choice.value = "";
+      const isGone = !names.includes(store.object);
+      store.select(added ?? (isGone ? (before.length ? "" : names[0] ?? "") : store.object));
     }
-    this.#show(this.#name !== before.find(({ name }) => name === this.#name)?.name);
+    this.#show();
   }
 
   // Let the person change objects, or say why not.
@@ -186,7 +187,6 @@ export class ObjectForm {
     this.element.hidden = !this.#objects.length;
     this.element.classList.toggle("none", !object);
     this.#permit();
-    if (again) window.dispatchEvent(new CustomEvent("chosen", { detail: this.#name }));
     if (!object || (!again && (this.#sender || performance.now() - this.#acted < HELD || this.element.matches(":active")))) return;
     const { colour, opacity, size, scale, hidden, T, held, fixed, zone, overlap } = object;
     /** A typed text that is not sent yet stays. @param {HTMLInputElement} input @param {string | number} text */

@@ -11,7 +11,8 @@ export class Store {
   trip = null; // ms, round trip; null if it is not known
   /** @type {string | null} */
   proven = null; // cause of a stop that is confirmed on another path
-  /** @type {((status: Page.Status) => void)[]} */
+  object = ""; // name of the selected object
+  /** @type {((status: Page.Status, before: Page.Status | null) => void)[]} */
   #followers = [];
 
   // The status while there is a connection; null without one.
@@ -19,9 +20,16 @@ export class Store {
     return this.up ? this.status : null;
   }
 
-  /** Call `follower` with each status from now on. @param {(status: Page.Status) => void} follower */
+  /** Call `follower` with each status from now on, and the one before it. @param {(status: Page.Status, before: Page.Status | null) => void} follower */
   follow(follower) {
     this.#followers.push(follower);
+  }
+
+  /** Select an object by its name, in the scene and in the sheet of objects; "" selects none. @param {string} name */
+  select(name) {
+    if (name === this.object) return;
+    this.object = name;
+    window.dispatchEvent(new Event("selected"));
   }
 
   connect() {
@@ -40,8 +48,9 @@ export class Store {
 
   /** Take a message, which has only the changes; the first has all. @param {Partial<Page.Status>} changes */
   take(changes) {
-    const status = /** @type {Page.Status} */ ({ ...this.status, ...changes });
+    const before = this.status;
+    const status = /** @type {Page.Status} */ ({ ...before, ...changes });
     this.status = status;
-    for (const follower of this.#followers) follower(status);
+    for (const follower of this.#followers) follower(status, before);
   }
 }

@@ -5,16 +5,19 @@ import { readObjects } from "../server.js";
 import { placeNear } from "./place_near.js";
 
 const EVERY = 1000; // ms between two looks at the object, which others may move or remove
+const PROPS = ["cup", "basin"]; // objects whose nodes have their names
+
+/** Return the path of the node of an object. @param {string} name */
+const pathOf = (name) => (PROPS.includes(name) ? `/${name}` : `/objects/${encodeURIComponent(name)}`);
 
 export class Selection {
   #scene;
   #page; // {say, store}
   #changed;
   /** @type {Api.SceneObject | null} */
-  #object = null;
-  /** @type {Three.Object3D | null} */
-  node = null; // that shows it
-  #watch = repeating(() => this.#refresh(), EVERY);
+  #object = null; // once it is read
+  #pixel = /** @type {Page.Pixel | null} */ (null); // where it was clicked
+  #watch = repeating(() => this.#read(), EVERY);
   #name = html("b");
   #bar;
 
@@ -31,64 +34,60 @@ export class Selection {
     const clear = button("×", () => this.clear(), { "aria-label": "Deselect" });
     this.#bar = html("div", { id: "selection", role: "group", "aria-label": "Selected object", hidden: "" }, this.#name, remove, clear);
     stage.append(this.#bar);
-    // The sheet of objects shows another one.
-    window.addEventListener("chosen", (event) => /** @type {CustomEvent<string>} */ (event).detail !== this.#object?.name && this.clear());
+    window.addEventListener("selected", () => this.#follow());
+    this.#follow();
   }
 
-  /** Select the object that a node shows, whose bar is shown near a pixel; null for none. @param {Three.Object3D | null} node @param {Page.Pixel} pixel */
-  async pick(node, pixel) {
-    const objects = node ? await readObjects() : [];
-    const object = node && this.#shownBy(node, objects);
-    this.#show(object?.held ? null : object, node);
-    if (this.#object) placeNear(this.#bar, this.#scene, pixel);
+  // The node that shows it; undefined without one.
+  get node() {
+    return this.#object ? sceneIn(this.#scene).node(pathOf(this.#object.name)) : undefined;
+  }
+
+  /** Select the object of a node, whose bar is shown near a pixel; "" for none. @param {string} path @param {Page.Pixel} pixel */
+  pick(path, pixel) {
+    this.#pixel = pixel;
+    this.#page.store.select(decodeURIComponent(path.slice(path.lastIndexOf("/") + 1)));
+    this.#pixel = null;
   }
 
   // Remove the selected object. Return whether there is one.
   remove() {
-    if (!this.#object) return false;
-    this.#page.say({ do: "remove", name: this.#object.name });
+    const { object } = this.#page.store;
+    if (!object) return false;
+    this.#page.say({ do: "remove", name: object });
     this.clear();
     return true;
   }
 
   // Select nothing.
   clear() {
-    this.#show(null, null);
+    this.#page.store.select("");
   }
 
-  /** The object whose frame is nearest to that of its node. @param {Three.Object3D} node @param {Api.SceneObject[]} objects */
-  #shownBy(node, objects) {
-    const { world } = sceneIn(this.#scene);
-    const place = world().worldToLocal(node.getWorldPosition(node.position.clone())).toArray();
-    /** @param {Api.SceneObject} object */
-    const distance = ({ T }) => Math.hypot(...place.map((x, row) => x - T[row][3]));
-    const shown = objects.filter(({ hidden }) => !hidden);
-    return shown.sort((a, b) => distance(a) - distance(b)).at(0) ?? null;
-  }
-
-  /** @param {Api.SceneObject | null} object @param {Three.Object3D | null} node */
-  #show(object, node) {
-    if (this.#object?.name !== object?.name) this.#arrows(false);
-    this.#object = object;
-    this.node = object && node;
-    this.#bar.hidden = !object;
+  // Show another object, or none.
+  #follow() {
+    this.#arrows(false);
+    this.#object = null;
+    this.#bar.hidden = true;
     this.#changed();
-    this.#watch(object !== null);
-    if (!object) return;
-    write(this.#name, object.name);
-    // The sheet of objects, if it is open, shows the same one.
-    window.dispatchEvent(new CustomEvent("selected", { detail: object.name }));
-    this.#arrows(true);
+    this.#watch(this.#page.store.object !== "");
   }
 
-  async #refresh() {
-    const { name } = this.#object ?? {};
-    const object = (await readObjects()).find((other) => other.name === name && !other.held);
-    if (this.#object?.name !== name) return;
+  async #read() {
+    const [{ store }, pixel] = [this.#page, this.#pixel];
+    const name = store.object;
+    const object = (await readObjects()).find((other) => other.name === name);
+    if (store.object !== name) return;
     if (!object) return this.clear();
+    const isNew = this.#object === null;
     this.#object = object;
     // viser hides them again after a lost connection.
     this.#arrows(true);
+    this.#bar.hidden = object.held;
+    if (!isNew) return;
+    write(this.#name, name);
+    placeNear(this.#bar, this.#scene, pixel ?? sceneIn(this.#scene).pixelOf(pathOf(name)) ?? [0, 0]);
+    this.#changed();
   }
 
   /** Show the arrows of the object, or show them as the server does. What the arm carries has none. @param {boolean} own */

@@ -13,8 +13,7 @@ import { Views } from "./views.js";
 const CLICK = 5; // px, within which a press and its release count as a click
 const TABLE = "/table";
 const SOLID = ["/arm", "/cup", "/basin", "/objects", TABLE]; // nodes that a ray can meet
-const OBJECTS = ["/cup", "/basin"]; // nodes of objects; the others are below the next one
-const MORE = "/objects";
+const OBJECT = /^\/(cup|basin|objects\/[^/]+)$/; // name of the node of an object
 
 /** @param {MouseEvent} event @returns {Page.Pixel} */
 const pixelOf = ({ clientX, clientY }) => [clientX, clientY];
@@ -58,14 +57,12 @@ export class Stage {
     });
     scene.addEventListener("load", () => this.#listen());
     // What is held at a stop, or when another person drives, moves nothing afterwards.
-    let stopped = Boolean(page.store.status?.stopped);
-    page.store.follow((status) => {
-      // While the arm is stopped, a new drag is refused with the reason.
-      const stops = status.stopped && !stopped;
-      stopped = Boolean(status.stopped);
+    page.store.follow((status, before) => {
       this.#fade();
-      if (stops || !mayDrive(page.store.live)) this.drop();
+      // While the arm is stopped, a new drag is refused with the reason.
+      if ((status.stopped && !before?.stopped) || !mayDrive(page.store.live)) this.drop();
     });
+    window.addEventListener("selected", () => this.selection || this.#loadSelection());
     document.addEventListener("visibilitychange", () => document.hidden && this.joints.lose());
     window.addEventListener("blur", () => this.#blur());
   }
@@ -182,10 +179,8 @@ export class Stage {
 
   /** Return the node of the object of which `shape` is a part; null without one. @param {Three.Object3D | null} shape */
   #objectOf(shape) {
-    const { node, owner } = sceneIn(this.#scene);
-    const [objects, more] = [OBJECTS.map(node), node(MORE)];
-    // viser has a group of its own round each node.
-    return owner(shape, (part) => objects.includes(part) || (more !== undefined && part.parent?.parent === more));
+    const { nameOf, owner } = sceneIn(this.#scene);
+    return owner(shape, (part) => OBJECT.test(nameOf(part)));
   }
 
   // Highlight the object under the pointer, or the selected one.
@@ -209,11 +204,13 @@ export class Stage {
     const joint = hit && this.joints.of(hit.object);
     this.joints.select(joint, pixel);
     const object = hit && joint === null ? this.#objectOf(hit.object) : null;
-    if (object && !this.selection) {
-      const { Selection } = await import("./selection.js");
-      this.selection ??= new Selection(this.#stage, this.#scene, this.#page, () => this.#light());
-    }
-    this.selection?.pick(object, pixel);
+    if (object && !this.selection) await this.#loadSelection();
+    this.selection?.pick(object ? sceneIn(this.#scene).nameOf(object) : "", pixel);
+  }
+
+  async #loadSelection() {
+    const { Selection } = await import("./selection.js");
+    this.selection ??= new Selection(this.#stage, this.#scene, this.#page, () => this.#light());
   }
 
   /** Look at the point of a part or an object under the pointer. @param {MouseEvent} event */

@@ -72,17 +72,15 @@ export class Timeline {
     this.#selection = new Selection(page, this.#part.work);
     this.#list();
     this.#listen();
-    let stopped = Boolean(page.store.status?.stopped);
-    /** @param {Page.Status | null} status */
-    const follow = (status) => {
+    /** @param {Page.Status | null} status @param {Page.Status | null} before */
+    const follow = (status, before) => {
       this.#news = 2;
       box.classList.toggle("rec", Boolean(status?.episodes?.running));
-      if (status?.stopped && !stopped) this.live();
-      stopped = Boolean(status?.stopped);
+      if (status?.stopped && !before?.stopped) this.live();
       // Scripts do not move a robot that has only joints.
       this.#part.again.hidden = !status?.scripts;
     };
-    follow(page.store.status);
+    follow(page.store.status, null);
     page.store.follow(follow);
   }
 

@@ -213,7 +213,7 @@ def test_zone_is_added_in_the_sheet(page: ViserPage, reader: Client, artefacts: 
     size.press("Enter")
     page.wait_until(lambda: objects(reader)["zone 1"].size[0] == 0.2, "the former size")
     drawn = "() => Object.keys(__viserMutable.nodeRefFromName)"
-    second = re.compile(r"/objects/\d+/shape")
+    second = re.compile(r"/objects/[^/]+/shape")
     before = len(list(filter(second.match, page.frame.evaluate(drawn))))
     page.page.click("#add-plane")
     page.wait_until(

@@ -38,15 +38,6 @@ def test_times_are_those_of_the_browser_and_oneself_is_you(browser: Browser) -> 
             assert module(page, "page/words.js", addressed, words) == expected
 
 
-def test_comma_of_a_typed_number_is_its_point(page: Page) -> None:
-    load(page, "Keys", "page/keys.js")
-    page.evaluate("""() => document.body.append(
-        Object.assign(document.createElement("input"), { type: "number", id: "length" }))""")
-    length = page.locator("#length")
-    length.press_sequentially("12,5")
-    assert length.input_value() == "12.5"
-
-
 # First frame
 
 CONTEXTS = """({ FirstFrame }, draws) => {
@@ -121,7 +112,11 @@ def test_place_of_an_object_is_typed_by_who_drives(page: Page) -> None:
     page.evaluate(
         """() => {
             const live = { role: "operator", mine: true, own_program: false, holder: "Ada" };
-            const store = { live, follow: (act) => (window.follow = act) };
+            const store = { live, object: "", follow: (act) => (window.follow = act) };
+            store.select = (name) => {
+                store.object = name;
+                window.dispatchEvent(new Event("selected"));
+            };
             const [say, toast] = [(request) => said.push(request), (words) => told.push(words)];
             Object.assign(window, { said: [], told: [], live });
             new Sheet.ObjectForm({ store, say, toast }).watch(true);
@@ -142,7 +137,7 @@ def test_place_of_an_object_is_typed_by_who_drives(page: Page) -> None:
     x.fill("")
     x.press("Enter")
     page.wait_for_function("told.length === 1")
-    assert page.evaluate("told") == ["x: nothing is not a number. It was not sent."]
+    assert page.evaluate("told") == ["x needs a number."]
     assert page.evaluate("said.length") == 1
     turns, names = [0.0, 1.0, 0.0], ["Turn, °", "Colour", "Opacity"]
     for count, (name, value) in enumerate(zip(names, ("90", "#ff8800", "40"), strict=True), 2):
@@ -447,10 +442,10 @@ def test_undo_names_the_stops_that_the_page_knows(page: Page) -> None:
         "edit.js",
         """({ begin, key }) => {
             const [said, scene] = [[], document.createElement("iframe")];
-            const store = { up: true, follow: (note) => (store.note = note) };
+            const store = { follow() {} };
             begin({ store, scene, toast() {}, say: (each) => said.push(each) }, {});
             for (const revocations of [7, 8]) {
-                store.note({ undo: ["arm (drag)"], revocations });
+                store.live = { undo: ["arm (drag)"], revocations };
                 const pressed = { code: "KeyZ", key: "z", ctrlKey: true, target: document.body };
                 key({ type: "keydown", ...pressed });
             }

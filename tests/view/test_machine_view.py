@@ -117,7 +117,7 @@ def test_objects_and_floor_are_shown_at_the_height_of_the_table(
     assert floor.position[2] == pytest.approx(-0.3, abs=1e-3)
     state = session.step(publisher.snapshot.state, (cmd.PlaceObject(block(-0.3)),), 0.0)
     view.show(replace(publisher.snapshot, state=state))
-    np.testing.assert_allclose(shown(server, "/objects/1")[:3, 3], (0.2, 0.0, -0.3))
+    np.testing.assert_allclose(shown(server, "/objects/block")[:3, 3], (0.2, 0.0, -0.3))
     handle: Any = internals.nodes(server)["/handles/block"]
     assert not handle.visible
 

@@ -35,7 +35,7 @@ from katana450.server.view.scene_objects import SceneObjectNodes
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
 
-PATH = "/objects/1"
+PATH = "/objects/it"
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from katana450.arm.robot.visual import Visual
 from katana450.maths.collision.engine import hull_triangles
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.server.view.scene import Window
+from katana450.server.view.scene import Window, node_name
 from katana450.server.viser_bridge.posing import place, turn
 
 COLOUR = (148, 163, 184)
@@ -61,7 +61,6 @@ class SceneObjectNodes:
         self._meshes = meshes
         self._frames: dict[str, viser.FrameHandle] = {}
         self._shapes: dict[str, ObjectShape] = {}
-        self._made = 0
         self._objects: dict[str, SceneObject] = {}
         self._seen: tuple[SceneObject, ...] = ()
 
@@ -95,8 +94,7 @@ class SceneObjectNodes:
         turn(self._frames[scene_object.name], (w, i, j, k))
 
     def _add(self, name: str) -> None:
-        self._made += 1
-        path = f"/{name}" if name in PROPS else f"/objects/{self._made}"
+        path = f"/{name}" if name in PROPS else f"/objects/{node_name(name)}"
         self._frames[name] = self._server.scene.add_frame(path, show_axes=False)
         self._shapes[name] = ObjectShape(self._server, path, self._meshes, self._props)
 
