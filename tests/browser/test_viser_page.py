@@ -91,7 +91,8 @@ def test_page_offers_its_scene(page: ViserPage) -> None:
         assert ask(page, "Viser.thumbnail({}, 9, 9)") == ""
     with part("drawing"):
         assert ask(page, "Viser.drawing() === Viser.viewer()")
-    with part("node"):
+    with part("node"), part("nameOf"):
+        assert ask(page, "Viser.nameOf(Viser.node('/box'))") == "/box"
         assert ask(page, "Viser.node('/box').isObject3D && Viser.node('').isObject3D")
         assert ask(page, "Viser.node('/none') === undefined")
     with part("world"):
