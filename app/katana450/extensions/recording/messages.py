@@ -37,6 +37,8 @@ SOLIDS: Final = "/solids"
 STATE: Final = "/state"
 EVENTS: Final = "/events"
 EPISODES: Final = "/episodes"
+CAMERAS: Final = "/cameras/"
+"""Start of the topic of a camera, before its name."""
 
 SHARED_TOPICS: Final = {"Plan": PLANS, "Solid": SOLIDS}
 """Topic of each class of shared values."""

@@ -129,12 +129,14 @@ class RecordingHeader:
         environment: gives the poses of objects in the hand.
         metadata: texts by their names, see ``header_of``.
         attachments: files that belong to it.
+        cameras: names of the cameras whose pictures it may have.
     """
 
     robot: Robot
     environment: Environment
     metadata: Mapping[str, str]
     attachments: tuple[Attachment, ...] = ()
+    cameras: tuple[str, ...] = ()
 
 
 def header_of(

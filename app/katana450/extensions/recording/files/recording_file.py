@@ -26,7 +26,7 @@ from mcap.stream_reader import StreamReader
 from katana450.errors import InputError
 from katana450.extensions.recording.files.header import METADATA, Attachment, RecordedSettings
 from katana450.extensions.recording.forms import FormError, json_form
-from katana450.extensions.recording.messages import NANO, nanoseconds
+from katana450.extensions.recording.messages import CAMERAS, NANO, nanoseconds
 
 MAX_CHUNK_BYTES = 64_000_000
 """Maximum size of an unpacked chunk. The writer makes chunks of 1 MB and one message more."""
@@ -96,7 +96,7 @@ def reading(path: Path) -> Iterator[None]:
 
 
 class Message(NamedTuple):
-    """A message: its topic, the number of its tick, its time [ns] and its JSON."""
+    """A message: its topic, the number of its tick, its time [ns] and its content, mostly JSON."""
 
     topic: str
     number: int
@@ -399,6 +399,12 @@ class RecordingFile:
                     raise ValueError("its attachments are wrong")
             yield Attachment(file.name, file.media_type, file.data, file.log_time)
 
+    @property
+    def cameras(self) -> list[str]:
+        """Names of the cameras whose pictures it may have."""
+        topics = self._topics.values()
+        return [topic.removeprefix(CAMERAS) for topic in topics if topic.startswith(CAMERAS)]
+
     def counts(self) -> dict[str, int]:
         """Return the number of messages of each topic."""
         return {
@@ -436,6 +442,9 @@ class RecordingFile:
 
     def messages_of(self, chunk: ChunkSpan, *topics: str) -> list[Message]:
         """Return the messages of ``topics`` in ``chunk``. Raises InputError."""
+        if chunk.counts and not self.has(chunk, *topics):
+            # The pictures of a camera are not read for others.
+            return []
         wanted = {number: topic for number, topic in self._topics.items() if topic in topics}
         with self._reading() as stream:
             return list(messages_in(content_at(stream, chunk.offset), wanted))

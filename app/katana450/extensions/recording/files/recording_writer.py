@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, BinaryIO
 
 import zstandard
@@ -38,6 +38,13 @@ from katana450.cli.version import version
 from katana450.extensions.recording.codec import Codec
 from katana450.extensions.recording.episodes.episode import EpisodeMessage
 from katana450.extensions.recording.files.header import METADATA, Attachment, RecordingHeader
+from katana450.extensions.recording.files.pictures import (
+    ENCODING,
+    SCHEMA,
+    SCHEMA_ENCODING,
+    SCHEMA_NAME,
+    picture_message,
+)
 from katana450.extensions.recording.files.recording_file import Message
 from katana450.extensions.recording.files.script_runs import (
     PROGRAM,
@@ -47,6 +54,7 @@ from katana450.extensions.recording.files.script_runs import (
 )
 from katana450.extensions.recording.forms import FormError, json_text
 from katana450.extensions.recording.messages import (
+    CAMERAS,
     CHECKPOINTS,
     COMMANDS,
     EPISODES,
@@ -100,16 +108,21 @@ def packed_records(records: Iterable[Any]) -> bytes:
     return bytes(builder.end())
 
 
-def write_chunk(out: BinaryIO, summary: Summary, content: bytes, index: Index) -> None:
+def write_chunk(
+    out: BinaryIO, summary: Summary, content: bytes, index: Index, *, packs: bool = True
+) -> None:
     """Write a chunk with the records ``content``, and add it to ``summary``.
 
-    ``index``: the messages in it, of which there is at least one.
+    ``index``: the messages in it, of which there is at least one. ``packs``: whether to compress.
     """
     times = [t for places in index.values() for t, _ in places]
     first, last = min(times), max(times)
-    packed = zstandard.ZstdCompressor(compression_params=PACKING).compress(content)
+    compression, packed = "", content
+    if packs:
+        compression = "zstd"
+        packed = zstandard.ZstdCompressor(compression_params=PACKING).compress(content)
     start = out.tell()
-    chunk = Chunk("zstd", packed, last, first, zlib.crc32(content), len(content))
+    chunk = Chunk(compression, packed, last, first, zlib.crc32(content), len(content))
     chunk_length = write_records(out, [chunk])
     index_at, places_at = out.tell(), {}
     indexes = b""
@@ -121,7 +134,7 @@ def write_chunk(out: BinaryIO, summary: Summary, content: bytes, index: Index) -
         ChunkIndex(
             chunk_length=chunk_length,
             chunk_start_offset=start,
-            compression="zstd",
+            compression=compression,
             compressed_size=len(packed),
             message_end_time=last,
             message_index_length=len(indexes),
@@ -175,17 +188,43 @@ MESSAGE = struct.Struct("<BQHIQQ")
 """Opcode, length, channel, number, and two times of a message, before its data."""
 
 
+class ChunkBuffer:
+    """The messages of the next chunk, and the places of these."""
+
+    def __init__(self) -> None:
+        """Begin without messages."""
+        self.content = bytearray()
+        self.index: dict[int, list[tuple[int, int]]] = {}
+
+    def add(self, channel: int, number: int, log_time: int, data: bytes) -> None:
+        """Add a message; see ``recording_file.Message``."""
+        self.index.setdefault(channel, []).append((log_time, len(self.content)))
+        length = MESSAGE.size - 9 + len(data)
+        self.content += MESSAGE.pack(Opcode.MESSAGE, length, channel, number, log_time, log_time)
+        self.content += data
+
+
 class MessageWriter:
-    """Writes messages on the topics of recordings to a file. For use in one thread."""
+    """Writes messages on the topics of recordings to a file. For use in one thread.
+
+    Pictures are in chunks of their own, which are not compressed, so that states are read without
+    them.
+    """
 
     def __init__(
-        self, file: BinaryIO, metadata: Mapping[str, str], attachments: Iterable[Attachment]
+        self,
+        file: BinaryIO,
+        metadata: Mapping[str, str],
+        attachments: Iterable[Attachment],
+        cameras: Collection[str] = (),
     ) -> None:
-        """Begin a recording in ``file``, which is open for writing and empty."""
+        """Begin a recording in ``file``, which is open for writing and empty.
+
+        ``cameras``: names of the cameras whose pictures it may have.
+        """
         self._file = file
         self._summary, self._channels = Summary(), dict[str, int]()
         self._summary.statistics = Statistics(0, 0, {}, 0, 0, 0, 0, 0, 0)
-        self._index: dict[int, list[tuple[int, int]]] = {}
         file.write(MAGIC)
         write_records(file, [Header("katana450", f"katana450 {version()}")])
         for number, topic in enumerate(TOPICS, 1):
@@ -193,16 +232,23 @@ class MessageWriter:
             self._summary.schemas[number] = Schema(number, text, "jsonschema", topic.schema_name)
             self._summary.channels[number] = Channel(number, topic.name, "json", {}, number)
             self._channels[topic.name] = number
-        described = []
-        for number in self._channels.values():
-            described += [self._summary.schemas[number], self._summary.channels[number]]
+        schema = len(TOPICS) + 1
+        if cameras:
+            definition = SCHEMA.encode()
+            self._summary.schemas[schema] = Schema(schema, definition, SCHEMA_ENCODING, SCHEMA_NAME)
+        for number, name in enumerate(cameras, schema):
+            self._channels[CAMERAS + name] = number
+            self._summary.channels[number] = Channel(number, CAMERAS + name, ENCODING, {}, schema)
+        self._messages, self._pictures = ChunkBuffer(), ChunkBuffer()
         # In the first chunk, so that the beginning of a file alone can be read.
-        self._content = bytearray(packed_records(described))
+        described = [*self._summary.schemas.values(), *self._summary.channels.values()]
+        self._messages.content += packed_records(described)
         self._add_metadata(metadata)
         statistics = self._summary.statistics
         for attachment in attachments:
             self.attach(attachment)
-        statistics.schema_count = statistics.channel_count = len(TOPICS)
+        statistics.schema_count = len(self._summary.schemas)
+        statistics.channel_count = len(self._summary.channels)
         statistics.metadata_count = len(self._summary.metadata_indexes)
 
     def _add_metadata(self, metadata: Mapping[str, str]) -> None:
@@ -227,32 +273,34 @@ class MessageWriter:
         channel = self._channels.get(topic)
         if channel is None:
             return
-        content = self._content
-        self._index.setdefault(channel, []).append((log_time, len(content)))
-        length = MESSAGE.size - 9 + len(data)
-        content += MESSAGE.pack(Opcode.MESSAGE, length, channel, number, log_time, log_time)
-        content += data
-        if len(content) > CHUNK_BYTES:
-            self._end_chunk()
+        # The first chunk describes the channels, whatever else is in it.
+        is_apart = topic.startswith(CAMERAS) and bool(self._summary.chunk_indexes)
+        buffer = self._pictures if is_apart else self._messages
+        buffer.add(channel, number, log_time, data)
+        if len(buffer.content) > CHUNK_BYTES:
+            self._end_chunk(buffer)
 
     def copy(self, message: Message) -> None:
         """Write ``message`` of another recording, unless its topic is not one of recordings."""
         self.add(message.topic, message.number, message.log_time, message.data)
 
-    def _end_chunk(self) -> None:
-        if self._index:
-            write_chunk(self._file, self._summary, bytes(self._content), self._index)
-            self._content.clear()
-            self._index = {}
+    def _end_chunk(self, buffer: ChunkBuffer) -> None:
+        if buffer.index:
+            packs = buffer is self._messages
+            content = bytes(buffer.content)
+            write_chunk(self._file, self._summary, content, buffer.index, packs=packs)
+            buffer.content.clear()
+            buffer.index = {}
 
     def flush(self) -> None:
-        """End the present chunk, and give everything to the system."""
-        self._end_chunk()
+        """End the present chunks, and give everything to the system."""
+        self._end_chunk(self._messages)
+        self._end_chunk(self._pictures)
         self._file.flush()
 
     def finish(self) -> None:
         """Write the index and the end of the file, which stays open."""
-        self._end_chunk()
+        self.flush()
         write_end(self._file, self._summary)
         self._file.flush()
 
@@ -269,7 +317,7 @@ class RecordingWriter:
 
     def __init__(self, file: BinaryIO, header: RecordingHeader) -> None:
         """Begin a recording in ``file``, which is open for writing and empty."""
-        self._writer = MessageWriter(file, header.metadata, header.attachments)
+        self._writer = MessageWriter(file, header.metadata, header.attachments, header.cameras)
         self._codec, self._digester = Codec(), Digester()
         self._messages = StateMessages(header.robot, header.environment)
         self._number = 0
@@ -338,6 +386,10 @@ class RecordingWriter:
     def episode(self, t: float, message: EpisodeMessage) -> None:
         """Record the description of an episode at ``t`` [s]; see ``episodes.episode``."""
         self._add(EPISODES, t, message)
+
+    def picture(self, camera: str, t: float, jpeg: bytes) -> None:
+        """Record a picture of ``camera`` at ``t`` [s], a JPEG file."""
+        self._writer.copy(picture_message(camera, max(nanoseconds(t), 0), jpeg))
 
     def flush(self) -> None:
         """Give everything to the system. ``os.fsync`` of the file then brings it to the disk."""

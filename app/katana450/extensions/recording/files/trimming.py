@@ -24,6 +24,7 @@ from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.files.script_runs import begun_before, scripts_in
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.messages import (
+    CAMERAS,
     CHECKPOINTS,
     COMMANDS,
     EPISODES,
@@ -51,9 +52,9 @@ def trim(
 
     The sources are files of one session, which are put into the order of their times. The ticks
     from the last complete state before ``start`` on are kept too, so that the part can be simulated
-    again, and the texts of the scripts that ran in it. ``episode``: message on ``/episodes`` that
-    replaces all those of the sources. Raises InputError if there is nothing in that time, or a file
-    cannot be read.
+    again, the texts of the scripts that ran in it, and the pictures of cameras. ``episode``:
+    message on ``/episodes`` that replaces all those of the sources. Raises InputError if there is
+    nothing in that time, or a file cannot be read.
     """
     with ExitStack() as stack:
         files = [stack.enter_context(RecordingFile.open(path)) for path in sources]
@@ -129,7 +130,8 @@ def _write(
     start, end = part
     metadata = {**files[0].metadata, PART_START: repr(start)}
     attachments, runs = scripts_in(files, start, end)
-    copy = MessageWriter(target, metadata, attachments)
+    cameras = sorted({name for file in files for name in file.cameras})
+    copy = MessageWriter(target, metadata, attachments, cameras)
     needed: set[bytes] = set()
     for message in _simulated(files, (COMMANDS, CHECKPOINTS), begin, end):
         needed.update(KEY.findall(message.data))
@@ -163,6 +165,9 @@ def _write(
         # In a chunk of its own, which is found at once.
         copy.flush()
         copy.copy(Message(EPISODES, number, nanoseconds(end), episode))
+    for file in files:
+        for message in file.messages(*(CAMERAS + name for name in cameras), start=start, end=end):
+            copy.copy(message)
     copy.finish()
 
 
