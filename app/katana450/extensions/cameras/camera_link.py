@@ -10,19 +10,12 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 
-import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from katana450.arm.runtime.pipes.guarded_pipe import PIPE_ERRORS
-from katana450.arm.runtime.pipes.private_listener import Greeting, PrivateAddress, connect
-from katana450.extensions.cameras.camera_process import PAGE, RETRY_SECONDS, Picture
+from katana450.arm.runtime.pipes.private_listener import PrivateAddress
+from katana450.extensions.cameras.camera_process import PAGE, Picture, received_pictures
 from katana450.server.web.admission import client_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, TOKEN_REQUIRED, Authenticator
-
-GREETING_SECONDS = 5.0
-"""[s] Maximum time for which the process of the cameras is awaited."""
-
-MAX_PICTURE_BYTES = 5_000_000
 
 AGE = struct.Struct("<d")
 """Age of a picture [s] before its JPEG file, in a message to a page."""
@@ -66,21 +59,16 @@ class CameraLink:
         return self._newest.get(name) or Picture(name, problem=NOT_READY)
 
     def _receive(self) -> None:
-        decoder = msgspec.msgpack.Decoder(Picture)
         while True:
-            with (
-                suppress(*PIPE_ERRORS),
-                connect(self._address, Greeting(PAGE), GREETING_SECONDS) as connection,
-            ):
-                while self._wakers:
-                    if connection.poll(RETRY_SECONDS):
-                        self._put(decoder.decode(connection.recv_bytes(MAX_PICTURE_BYTES)))
+            for picture in received_pictures(self._address, PAGE, lambda: bool(self._wakers)):
+                if picture is None:
+                    self._newest.clear()
+                else:
+                    self._put(picture)
             with self._lock:
-                self._newest.clear()
                 if not self._wakers:
                     self._receives = False
                     return
-            time.sleep(RETRY_SECONDS)
 
     def _put(self, picture: Picture) -> None:
         with self._lock:

@@ -1,27 +1,45 @@
 """The process that reads the cameras. A camera that is silent, slow or broken delays nothing else.
 
-It keeps the newest picture of each camera alone, and sends it to the page's server, when that asks.
+It sends the newest pictures to the page's server, and all to the process that records, while these
+are connected.
 """
 
 from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Mapping
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 import msgspec
 
-from katana450.arm.runtime.pipes.private_listener import Greeting, PrivateAddress, PrivateListener
+from katana450.arm.runtime.pipes.guarded_pipe import PIPE_ERRORS
+from katana450.arm.runtime.pipes.private_listener import (
+    Greeting,
+    PrivateAddress,
+    PrivateListener,
+    Roles,
+    connect,
+)
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.errors import KatanaError
 from katana450.extensions.cameras.sources import frames
 from katana450.platform_support import lower_priority
 
-PAGE = "page"
-"""Role of the page's server."""
+PAGE, RECORDER = "page", "recorder"
+"""Roles of the page's server and of the process that records."""
+
+WAITING = {PAGE: 1, RECORDER: 60}
+"""Number of pictures of a camera that wait for each of these, at most; older ones are left out."""
+
+GREETING_SECONDS = 5.0
+"""[s] Maximum time for which this process is awaited."""
+
+MAX_PICTURE_BYTES = 5_000_000
 
 RETRY_SECONDS = 1.0
 """[s] Time after the end of a camera's pictures until it is tried again."""
@@ -54,12 +72,14 @@ class CamerasConfig:
 
 
 class CameraReader:
-    """Reads the cameras, each in a thread of its own, and keeps their newest pictures."""
+    """Reads the cameras, each in a thread of its own, and sends their pictures."""
 
     def __init__(self, sources: Mapping[str, str]) -> None:
         """Begin to read ``sources``, the addresses of the cameras by name."""
         self._changed = threading.Condition()
         self._newest: dict[str, Picture] = {}
+        self._names = tuple(sources)
+        self._queues: list[dict[str, deque[Picture]]] = []
         for name, address in sources.items():
             threading.Thread(
                 target=self._read, args=(name, address), name=f"camera {name}", daemon=True
@@ -83,35 +103,63 @@ class CameraReader:
     def _put(self, picture: Picture) -> None:
         with self._changed:
             self._newest[picture.camera] = picture
+            for queues in self._queues:
+                queues[picture.camera].append(picture)
             self._changed.notify_all()
 
-    def send(self, connection: Connection, _greeting: Greeting) -> None:
-        """Send each newest picture by ``connection``, until the other end closes it.
+    def send(self, connection: Connection, greeting: Greeting) -> None:
+        """Send the newest pictures, and all later ones, until the other end closes ``connection``.
 
-        Pictures that come while one is sent are left out.
+        Of those that come while one is sent, the last ones wait, as many as its role says.
         """
-        sent: dict[str, Picture] = {}
-        with suppress(OSError):
-            while True:
-                for picture in self._newer(sent):
-                    connection.send_bytes(msgspec.msgpack.encode(picture))
-                    sent[picture.camera] = picture
-
-    def _newer(self, sent: Mapping[str, Picture]) -> list[Picture]:
-        """Return the newest pictures that are not in ``sent``, as soon as there is one."""
-
-        def newer() -> list[Picture]:
-            return [new for name, new in self._newest.items() if new is not sent.get(name)]
-
+        size = WAITING[greeting.role]
         with self._changed:
-            return self._changed.wait_for(newer)
+            newest = {name: [self._newest[name]] for name in self._newest}
+            queues = {name: deque(newest.get(name, []), size) for name in self._names}
+            self._queues.append(queues)
+        try:
+            while True:
+                with self._changed:
+                    self._changed.wait_for(lambda: any(queues.values()))
+                    pictures = [picture for queue in queues.values() for picture in queue]
+                    for queue in queues.values():
+                        queue.clear()
+                for picture in pictures:
+                    connection.send_bytes(msgspec.msgpack.encode(picture))
+        except OSError:
+            return
+        finally:
+            with self._changed:
+                self._queues.remove(queues)
+
+
+def received_pictures(
+    address: PrivateAddress, role: str, wanted: Callable[[], bool]
+) -> Iterator[Picture | None]:
+    """Yield the pictures of the process at ``address`` while they are ``wanted``.
+
+    None stands for the end of a connection, which is made again.
+    """
+    decoder = msgspec.msgpack.Decoder(Picture)
+    while wanted():
+        with (
+            suppress(*PIPE_ERRORS),
+            connect(address, Greeting(role), GREETING_SECONDS) as connection,
+        ):
+            while wanted():
+                if connection.poll(RETRY_SECONDS):
+                    yield decoder.decode(connection.recv_bytes(MAX_PICTURE_BYTES))
+        yield None
+        if wanted():
+            time.sleep(RETRY_SECONDS)
 
 
 def run_cameras(config: CamerasConfig, supervisor: SupervisorPipe) -> None:
     """Read the cameras in this process until the server ends."""
     lower_priority()
     reader = CameraReader(config.sources)
-    listener = PrivateListener(config.address, {PAGE: reader.send}, "the process of the cameras")
+    roles: Roles = dict.fromkeys(WAITING, reader.send)
+    listener = PrivateListener(config.address, roles, "the process of the cameras")
     listener.start()
     supervisor.report(READY)
     supervisor.ended.wait()
