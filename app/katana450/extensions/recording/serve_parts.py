@@ -56,7 +56,9 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
     options.recorder = PrivateAddress(f"{facts.address.name}-recorder", os.urandom(32))
     folder = options.record or default_folder(facts.port)
     episodes = _episodes_folder(options, facts.port)
-    config = RecorderConfig(facts, folder, episodes, options.recorder)
+    names = tuple(name for name, _ in options.camera)
+    cameras = getattr(options, "camera_process", None)
+    config = RecorderConfig(facts, folder, episodes, options.recorder, names, cameras)
     return ExtraProcess(
         "katana450 rec",
         "The process that records",

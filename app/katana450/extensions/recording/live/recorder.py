@@ -9,7 +9,7 @@ import logging
 import sys
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,6 +40,9 @@ END_NOTICE_TIME = 1.0
 SWITCH_INTERVAL = 0.001
 """[s] Time after which a busy thread lets another one run."""
 
+LOOK_SECONDS = 0.05
+"""[s] Time between two looks at whether pictures are to be recorded."""
+
 log = logging.getLogger(__name__)
 
 
@@ -52,12 +55,16 @@ class RecorderConfig:
         folder: folder of the ring.
         episodes: folder of the episodes.
         address: address of this process for the page's server.
+        camera_names: names of the cameras.
+        cameras: address of the process of the cameras; None without any.
     """
 
     facts: ServerFacts
     folder: Path
     episodes: Path
     address: PrivateAddress
+    camera_names: tuple[str, ...] = ()
+    cameras: PrivateAddress | None = None
 
 
 def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
@@ -76,6 +83,10 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
             return
         keeper = _episodes(config, ring, header, supervisor.ended)
         listener = _listener(config, keeper, scripts, supervisor.ended)
+        if config.cameras is not None:
+            threading.Thread(
+                target=_record_pictures, args=(config.cameras, ring), name="pictures", daemon=True
+            ).start()
         try:
             while True:
                 _receive(pipe, ring)
@@ -100,6 +111,7 @@ def _ring(config: RecorderConfig, scripts: RunningScripts) -> tuple[Ring, Record
     robot = find_robot(facts.settings, facts.urdf, facts.tool)
     environment = robot.session.environment
     header = header_of(robot.robot, facts.settings, facts.urdf, facts.tool, environment)
+    header = replace(header, cameras=config.camera_names)
     return Ring(config.folder, header, scripts=scripts), header
 
 
@@ -137,6 +149,17 @@ def _listener(
         if not ended.wait(END_NOTICE_TIME):
             log.error("Episodes and scripts cannot be recorded: %s", error)
         return None
+
+
+def _record_pictures(address: PrivateAddress, ring: Ring) -> None:
+    """Record the pictures of the cameras while the arm moves or an episode runs."""
+    from katana450.extensions.cameras.camera_process import RECORDER, received_pictures
+
+    while True:
+        for picture in received_pictures(address, RECORDER, ring.wants_pictures):
+            if picture is not None and picture.jpeg:
+                ring.put_picture(picture.camera, picture.t, picture.jpeg)
+        time.sleep(LOOK_SECONDS)
 
 
 def _receive(pipe: Connection, ring: Ring) -> None:

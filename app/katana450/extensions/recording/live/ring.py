@@ -36,7 +36,13 @@ MAX_HELD_FILES = 80
 """Number of files while an episode needs older ones: an hour of motion, and some more."""
 
 MAX_FILE_BYTES = 20_000_000
-"""Size after which a file ends, whatever it contains, so that the ring is bounded."""
+"""Size after which a file ends, without its pictures, so that the ring is bounded."""
+
+MAX_PICTURE_BYTES = 250_000_000
+"""Size of its pictures after which a file ends: those of three cameras in a minute."""
+
+PICTURE_SECONDS = 10.0
+"""[s] Time for which pictures are recorded after the last tick, unless an episode runs."""
 
 RETRY_SECONDS = 5.0
 """[s] Time after an error of the disk until the next attempt to write."""
@@ -115,7 +121,7 @@ class Ring:
         self._path = folder
         self._file: BinaryIO | None = None
         self._writer: RecordingWriter | None = None
-        self._ticks = 0
+        self._ticks = self._picture_bytes = 0
         # Ticks that a failure of the disk would take from the present file, and those it has taken.
         self._unsynced = self._lost = 0
         self._synced_bytes = 0
@@ -168,6 +174,27 @@ class Ring:
     def put(self, record: TickRecord) -> None:
         """Write the record of a tick."""
         self.put_all([record])
+
+    def wants_pictures(self) -> bool:
+        """Return whether pictures of cameras are to be recorded now."""
+        age = time.perf_counter() - self.last_t
+        return self.held is not None or age < PICTURE_SECONDS
+
+    def put_picture(self, camera: str, t: float, jpeg: bytes) -> None:
+        """Write a picture of ``camera`` at ``t`` [s], a JPEG file."""
+        with self.lock:
+            if not self._opened():
+                return
+            assert self._writer is not None
+            try:
+                self._writer.picture(camera, t, jpeg)
+            except OSError as error:
+                self._fail(error)
+                return
+            self._picture_bytes += len(jpeg)
+            if self._picture_bytes >= MAX_PICTURE_BYTES:
+                # An arm at rest has no ticks, after which it would be synced.
+                self.sync()
 
     def describe(self, t: float, content: EpisodeMessage | tuple[str, Mapping[str, Any]]) -> None:
         """Write and sync the message of an episode, or an event with its fields, at ``t`` [s]."""
@@ -259,7 +286,11 @@ class Ring:
             self._writer.flush()
             os.fsync(self._file.fileno())
             self._synced_bytes = self._file.tell()
-            full = self._synced_bytes >= MAX_FILE_BYTES or self._ticks >= MAX_FILE_TICKS
+            full = (
+                self._ticks >= MAX_FILE_TICKS
+                or self._picture_bytes >= MAX_PICTURE_BYTES
+                or self._synced_bytes - self._picture_bytes >= MAX_FILE_BYTES
+            )
             self.problem = ""
             self._unsynced = 0
         except OSError as error:
@@ -300,7 +331,7 @@ class Ring:
             self._path = self._folder / f"{time.time_ns() // 1000}{SUFFIX}"
             self._file = open(create_file(self._path, 0o600), "wb")  # noqa: SIM115 - for a minute
             self._writer = RecordingWriter(self._file, self._header)
-            self._ticks = 0
+            self._ticks = self._picture_bytes = 0
             if self._lost:
                 self._writer.lost(self.last_t, self._lost, self._disk_error)
             self._unsynced, self._lost = self._lost, 0

@@ -120,6 +120,11 @@ class OpenedRun:
         tick_inputs: list[State | TickInput | TickMessage] = self._ask("input_until", t)
         return tick_inputs
 
+    def picture(self, camera: str, t: float) -> bytes | None:
+        """See ``PlaybackRun.picture``."""
+        picture: bytes | None = self._ask("picture", camera, t)
+        return picture
+
     def close(self) -> None:
         """End the process, without waiting for a request that it works on."""
         process = self._process
@@ -233,8 +238,8 @@ def serve(path: Path, requests: BinaryIO, answers: BinaryIO) -> None:
 RING = "ring"
 """Name of the last minutes that the server has recorded itself."""
 
-MAX_FILE_BYTES = 200_000_000
-"""Maximum size of a file: three hours of motion without a pause."""
+MAX_FILE_BYTES = 1_000_000_000
+"""Maximum size of a file: four minutes with three cameras, half a day of motion without any."""
 
 PREFIX = "katana450-opened-"
 """Start of the names of the temporary folders of servers."""
