@@ -32,6 +32,7 @@ USED = {
     "task": ("lerobot",),
     "outcomes": ("lerobot",),
     "views": ("lerobot", "mp4"),
+    "cameras": ("lerobot",),
     "size": ("lerobot", "mp4"),
     "fps": ("lerobot", "mp4"),
     "urdf": ("lerobot", "mp4"),
@@ -138,8 +139,15 @@ def _add_export_options(parser: argparse.ArgumentParser) -> None:
         dest="views",
         action="append",
         choices=VIEWS,
-        help="lerobot: camera whose pictures each frame has, several times for several "
-        "(default: none); mp4: camera of the film (default: free)",
+        help="lerobot: view of the scene that is rendered for each frame, several times for "
+        "several (default: none); mp4: view of the film (default: free)",
+    )
+    parser.add_argument(
+        "--cameras",
+        type=lambda text: tuple(filter(None, text.split(","))),
+        metavar="LIST",
+        help="lerobot: recorded cameras whose pictures each frame has, or an empty list (default: "
+        "all that every file has)",
     )
     sizes = ", ".join(f"{w}x{h} for {name}" for name, (w, h) in DEFAULT_SIZES.items())
     parser.add_argument(

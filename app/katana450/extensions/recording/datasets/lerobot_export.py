@@ -15,7 +15,7 @@ import numpy.typing as npt
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
-from katana450.extensions.media.film import VideoEncoder
+from katana450.extensions.media.film import VideoEncoder, ffmpeg
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.datasets.lerobot_writer import (
     FIRST_FILE,
@@ -25,6 +25,11 @@ from katana450.extensions.recording.datasets.lerobot_writer import (
     LerobotWriter,
     PixelCounts,
     arrow,
+)
+from katana450.extensions.recording.datasets.recorded_pictures import (
+    Pixels,
+    cameras_of,
+    recorded_pictures,
 )
 from katana450.extensions.recording.episodes.episode import JUDGED, EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_folder import episodes_in
@@ -217,7 +222,6 @@ def check_same_robot(first: RecordingFile, other: RecordingFile) -> None:
 MIN_FRAMES = 2
 """Minimum number of frames of an episode."""
 
-Pixels = npt.NDArray[np.uint8]
 Cameras = Callable[[Iterator[State], int], AbstractContextManager[Iterator[tuple[Pixels, ...]]]]
 """Renders states, of which there is a number: the pictures of all views for each."""
 
@@ -231,8 +235,9 @@ class LerobotOptions:
         task: task of episodes that have none.
         outcomes: outcomes of the episodes to take.
         part: part of a recording without episodes, in seconds after its start.
-        views: names of the cameras.
+        views: views of the scene that are rendered.
         size: width and height of their pictures [px].
+        cameras: recorded cameras; None for those that all recordings have.
     """
 
     fps: int
@@ -241,6 +246,7 @@ class LerobotOptions:
     part: tuple[float, float] = (0.0, float("inf"))
     views: tuple[str, ...] = ()
     size: tuple[int, int] = (0, 0)
+    cameras: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -298,17 +304,26 @@ def export_lerobot(
     arrow()
     check_fps(options.fps)
     cuts, robot = _cuts(files_of(paths), options)
+    recorded = cameras_of(list(dict.fromkeys(cut.path for cut in cuts)), options.cameras)
+    both = sorted(set(recorded) & set(options.views))
+    if both:
+        raise InputError(
+            f"A recorded camera is {both[0]} too. Leave it out by --cameras or --view."
+        )
+    if recorded:
+        ffmpeg()
     first = _sampled_episode(cuts[0], options.fps)
     joints = first.state.shape[1] - first.gripper
-    shape = DatasetShape(robot, joints, first.gripper, options.fps, options.views, options.size)
+    sizes = dict.fromkeys(options.views, options.size) | recorded
+    shape = DatasetShape(robot, joints, first.gripper, options.fps, sizes)
     count = sum(len(cut.frames(options.fps)) for cut in cuts)
     with ExitStack() as stack:
         folder = stack.enter_context(new_folder(out))
         writer = LerobotWriter(folder, shape)
         stack.callback(writer.close)
         videos: list[EpisodeVideo] = []
-        for feature in shape.videos.values():
-            videos.append(EpisodeVideo(folder, feature, options.size, options.fps))
+        for name, feature in shape.videos.items():
+            videos.append(EpisodeVideo(folder, feature, sizes[name], options.fps))
             stack.callback(videos[-1].encoder.abandon)
         episodes: Iterator[_Episode] = (_sampled_episode(cut, options.fps) for cut in cuts)
         pictures: Iterator[tuple[Pixels, ...]] = repeat(())
@@ -318,8 +333,11 @@ def export_lerobot(
             states = _states(cuts, options.fps, session)
             pictures = progress(stack.enter_context(cameras(states, count)), count, out.name)
         for episode in episodes:
+            camera_pictures = recorded_pictures(episode.cut.path, recorded, episode.times)
             for _ in episode.times:
-                for video, picture in zip(videos, next(pictures), strict=True):
+                for video, picture in zip(
+                    videos, next(pictures) + next(camera_pictures), strict=True
+                ):
                     video.add(picture)
             columns: dict[str, object] = {}
             statistics = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -140,16 +140,14 @@ class DatasetShape:
         joints: number of joints, without the gripper.
         gripper: whether it has a gripper.
         fps: frames per second.
-        views: names of the cameras.
-        size: width and height of their pictures [px].
+        cameras: width and height of the pictures of each camera [px].
     """
 
     robot: str
     joints: int
     gripper: bool
     fps: int
-    views: tuple[str, ...] = ()
-    size: tuple[int, int] = (0, 0)
+    cameras: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
     @property
     def names(self) -> list[str]:
@@ -159,15 +157,24 @@ class DatasetShape:
 
     @property
     def videos(self) -> dict[str, str]:
-        """Name of the feature of each view."""
-        return {view: f"observation.images.{view}" for view in self.views}
+        """Name of the feature of each camera."""
+        return {name: f"observation.images.{name}" for name in self.cameras}
 
     @property
     def features(self) -> dict[str, dict[str, Any]]:
         """All features by name, each with type, shape and names. No name has a slash."""
         vector = {"dtype": "float32", "shape": [len(self.names)], "names": self.names}
-        width, height = self.size
-        pictures = {
+        return {
+            STATE: vector,
+            ACTION: vector,
+            **{self.videos[name]: self._video(*size) for name, size in self.cameras.items()},
+            **{name: _scalar("bool") for name in (DONE, SUCCEEDED)},
+            **{name: _scalar("float32") for name in (INTERVENTION, TIMESTAMP)},
+            **{name: _scalar("int64") for name in (SOURCE, FRAME, EPISODE, INDEX, TASK)},
+        }
+
+    def _video(self, width: int, height: int) -> dict[str, Any]:
+        return {
             "dtype": "video",
             "shape": [height, width, 3],
             "names": ["height", "width", "channels"],
@@ -181,14 +188,6 @@ class DatasetShape:
                 "video.channels": 3,
                 "has_audio": False,
             },
-        }
-        return {
-            STATE: vector,
-            ACTION: vector,
-            **dict.fromkeys(self.videos.values(), pictures),
-            **{name: _scalar("bool") for name in (DONE, SUCCEEDED)},
-            **{name: _scalar("float32") for name in (INTERVENTION, TIMESTAMP)},
-            **{name: _scalar("int64") for name in (SOURCE, FRAME, EPISODE, INDEX, TASK)},
         }
 
     def info(self, episodes: int, frames: int, tasks: int) -> dict[str, Any]:
@@ -205,7 +204,7 @@ class DatasetShape:
             "fps": self.fps,
             "splits": {"train": f"0:{episodes}"},
             "data_path": DATA_PATH,
-            "video_path": VIDEO_PATH if self.views else None,
+            "video_path": VIDEO_PATH if self.cameras else None,
             "features": self.features,
         }
 

@@ -302,6 +302,7 @@ def _lerobot(options: Namespace) -> Exported:
         part=(options.start, options.end),
         views=views,
         size=size,
+        cameras=options.cameras,
     )
     if len(options.files) > 1 and request.part != (0.0, math.inf):
         raise InputError("--from and --to cut one recording; trim several one by one before.")
