@@ -16,6 +16,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.recorded_robot import attached_urdf, recorded_robot
+from katana450.extensions.recording.files.pictures import SCHEMA_NAME, jpeg_of
 from katana450.extensions.recording.files.recording_file import (
     Message,
     RecordingFile,
@@ -25,6 +26,7 @@ from katana450.extensions.recording.files.script_runs import FOLDER, scripts_in
 from katana450.extensions.recording.files.table import LEAST, rows_from
 from katana450.extensions.recording.folders import new_folder
 from katana450.extensions.recording.messages import (
+    CAMERAS,
     EVENTS,
     NANO,
     ObjectPose,
@@ -119,7 +121,10 @@ class _Bag:
         self._root = robot.links[0].name
         self._objects: dict[str, ObjectPose] = {}
         self._shown: int | None = None
-        self.counts = dict.fromkeys(TOPICS, 0)
+        cameras = {CAMERAS + name: CAMERAS + f"{name}/compressed" for name in file.cameras}
+        self._topics = TOPICS | dict.fromkeys(cameras.values(), SCHEMA_NAME)
+        self._pictures = cameras
+        self.counts = dict.fromkeys(self._topics, 0)
         self._connections = {
             topic: writer.add_connection(
                 topic,
@@ -127,7 +132,7 @@ class _Bag:
                 typestore=self._store,
                 offered_qos_profiles=_latched() if topic in LATCHED else [],
             )
-            for topic, kind in TOPICS.items()
+            for topic, kind in self._topics.items()
         }
 
     def add_part(self, start: float, end: float) -> None:
@@ -137,11 +142,8 @@ class _Bag:
         states: Iterator[tuple[int, StateRow | Message]] = (
             (nanoseconds(row.t), row) for row in rows_from(self._file, begin, end)
         )
-        events: Iterator[tuple[int, StateRow | Message]] = (
-            (message.log_time, message)
-            for message in self._file.messages(EVENTS, start=begin, end=end)
-        )
-        for log_time, content in merge(states, events, key=itemgetter(0)):
+        others = (self._messages(topic, begin, end) for topic in (EVENTS, *self._pictures))
+        for log_time, content in merge(states, *others, key=itemgetter(0)):
             t = log_time + self._offset
             if not 0 <= t < MAX_TIME:
                 raise InputError(
@@ -156,11 +158,22 @@ class _Bag:
             report((log_time / NANO - self._file.start) / length)
             if isinstance(content, StateRow):
                 self._add_state(t, content)
+            elif content.topic in self._pictures:
+                name = content.topic.removeprefix(CAMERAS)
+                jpeg = np.frombuffer(jpeg_of(content), np.uint8)
+                topic, header = self._pictures[content.topic], self._header(t, name)
+                self._add(topic, t, header=header, format="jpeg", data=jpeg)
             else:
                 self._add(BAG_EVENTS, t, data=content.data.decode(errors="replace"))
 
+    def _messages(
+        self, topic: str, begin: float, end: float
+    ) -> Iterator[tuple[int, StateRow | Message]]:
+        for message in self._file.messages(topic, start=begin, end=end):
+            yield message.log_time, message
+
     def _add(self, topic: str, t: int, **fields: Any) -> None:
-        kind = TOPICS[topic]
+        kind = self._topics[topic]
         message = self._store.types[kind](**fields)
         data = self._store.serialize_cdr(message, kind)
         self._writer.write(self._connections[topic], t, data)
