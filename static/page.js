@@ -42,6 +42,7 @@ const page = {
   scene: element("scene", HTMLIFrameElement),
   stage: element("stage", HTMLElement),
   name: pageName(),
+  past: null,
 };
 const { store } = page;
 const frame = new FirstFrame();

@@ -1,5 +1,6 @@
-// Pictures of cameras over the scene, with their age. Loaded when the server has cameras.
+// Pictures of cameras beside the scene, with their age. Loaded when the server has cameras.
 import { styled, t, write } from "../dom.js";
+import { request } from "../server.js";
 import { html } from "../instruments/shape.js";
 
 const OLD = 300; // ms, age from which a picture is grey
@@ -14,13 +15,16 @@ class Camera {
   /** @type {WebSocket | null} */
   #socket = null;
   #made = -Infinity; // time of the picture that is shown
+  /** @type {Page.Context["past"]} */
+  #past = null; // the moment whose picture is shown
 
   /** @param {string} name @param {Page.Context} page */
   constructor(name, page) {
     this.page = page;
     this.name = name;
-    this.view = html("details", { open: "", "aria-label": `${t("Camera")} ${name}` }, html("summary", {}, name, this.#age), this.#canvas, this.#says);
+    this.view = html("details", { "aria-label": `${t("Camera")} ${name}` }, html("summary", {}, name, this.#age), this.#canvas, this.#says);
     this.view.addEventListener("toggle", () => (this.view.open ? this.#connect() : this.#socket?.close()));
+    this.view.open = matchMedia("(min-width: 900px)").matches;
     setInterval(() => this.#look(), LOOK);
   }
 
@@ -36,7 +40,7 @@ class Camera {
       if (typeof data === "string") {
         this.#made = -Infinity;
         write(this.#says, data);
-      } else await this.#show(data);
+      } else if (!this.page.past) await this.#show(data);
       ask();
     };
     socket.onclose = ({ reason }) => {
@@ -52,16 +56,40 @@ class Camera {
     // Half the round trip is the way of the picture from the server.
     const age = 1000 * new DataView(data).getFloat64(0, true) + (this.page.store.trip ?? 0) / 2;
     const made = performance.now() - age;
-    const picture = await createImageBitmap(new Blob([data.slice(AGE_BYTES)], { type: "image/jpeg" })).catch(() => null);
-    if (!picture) return write(this.#says, "A picture of this camera cannot be read.");
-    [this.#canvas.width, this.#canvas.height] = [picture.width, picture.height];
-    this.#canvas.getContext("2d")?.drawImage(picture, 0, 0);
-    picture.close();
+    if (!(await this.#draw(new Blob([data.slice(AGE_BYTES)], { type: "image/jpeg" })))) return;
     this.#made = made;
     this.#look();
   }
 
+  // Draw a picture, and return whether it could be read.
+  /** @param {Blob} file */
+  async #draw(file) {
+    const picture = await createImageBitmap(file).catch(() => null);
+    if (!picture) return write(this.#says, "A picture of this camera cannot be read.");
+    [this.#canvas.width, this.#canvas.height] = [picture.width, picture.height];
+    this.#canvas.getContext("2d")?.drawImage(picture, 0, 0);
+    picture.close();
+    return true;
+  }
+
+  // Show the picture of a moment of a recording.
+  /** @param {NonNullable<Page.Context["past"]>} past */
+  async #showPast(past) {
+    this.#made = -Infinity;
+    this.view.dataset.old = "false";
+    const answer = await request(`api/v1/playback/${encodeURIComponent(past.of)}/pictures/${this.name}?t=${past.t}`).catch(() => null);
+    if (past !== this.page.past) return;
+    const shown = answer?.status === 200 && (await this.#draw(await answer.blob()));
+    this.#canvas.hidden = !shown;
+    write(this.#age, "Recorded");
+    write(this.#says, shown ? "" : "No picture of this camera is recorded here.");
+  }
+
   #look() {
+    const past = this.page.past;
+    if (past && past !== this.#past) this.#showPast(past);
+    this.#past = past;
+    if (past) return;
     const age = performance.now() - this.#made;
     const isOld = age > OLD;
     this.view.dataset.old = String(isOld);
@@ -80,7 +108,7 @@ export class Card {
   constructor(stage, page) {
     this.#page = page;
     styled("cameras.css", import.meta.url);
-    stage.append(this.#cards);
+    stage.before(this.#cards);
   }
 
   /** Show the cameras of a status. @param {Page.Status} status */

@@ -125,7 +125,7 @@ export class Timeline {
   live() {
     this.#play(false);
     if (this.#t === null) return;
-    this.#t = null;
+    this.#t = this.#page.past = null;
     this.#hidden = false;
     sceneOf(this.#page.scene)?.hideNodes(null);
     this.#part.showPast(false);
@@ -268,6 +268,7 @@ export class Timeline {
       while (this.#t !== null && this.#t !== asked) {
         asked = this.#t;
         const { moving } = await api.show({ page: this.#page.name, of: this.#of, t: asked, ...this.#secondAt(asked) });
+        this.#page.past = this.#t === null ? null : { of: this.#of, t: asked };
         const scene = sceneOf(this.#page.scene);
         const end = performance.now() + LONG_LOAD;
         while (!this.#hidden && scene?.missing([RECORDED]).length && performance.now() < end) await new Promise((next) => setTimeout(next, LOOK));

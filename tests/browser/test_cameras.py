@@ -1,19 +1,23 @@
-"""Cameras over the scene: pictures with their age, grey when they are old. Without viser."""
+"""Cameras beside the scene: pictures with their age, grey when they are old. Without viser."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
 
 from tests.browser.camera import Drawing
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
-from tests.browser.server import APP, AppServer
-from tests.browser.sizes import PORTRAIT
+from tests.browser.server import APP, RECORDING_APP, AppServer
+from tests.browser.sizes import PORTRAIT, WIDE
 from tests.browser.test_accessibility import findings
+from tests.browser.test_timeline import place
 from tests.cameras.mjpeg_camera import MjpegCamera
+from tests.recording.test_episodes_on_a_server import move
+from tests.recording.test_recorder import POSTURES
 
 SECONDS = 20_000
 """[ms] Timeout of each step: other programs may keep the machine busy."""
@@ -49,6 +53,9 @@ def test_pictures_move_become_grey_when_they_are_old_and_come_back(
     page: ViserPage, camera: MjpegCamera
 ) -> None:
     document = page.page
+    # Folded at first on a phone.
+    for camera_name in ("table", "away"):
+        document.click(f"#cameras summary:has-text('{camera_name}')")
     document.wait_for_selector("#cameras [data-old=false] canvas:visible")
     age = document.inner_text("#cameras summary span >> nth=0")
     assert age.endswith(" ms")
@@ -72,3 +79,26 @@ def test_pictures_move_become_grey_when_they_are_old_and_come_back(
     # Folded, it asks for no more pictures.
     document.click("#cameras summary >> nth=0")
     document.wait_for_function("() => !document.querySelector('#cameras summary span').innerText")
+
+
+@pytest.mark.long
+def test_past_shows_recorded_pictures(
+    windows: Windows, camera: MjpegCamera, tmp_path: Path
+) -> None:
+    options = f"--camera=table={camera.url}", f"--record={tmp_path / 'ring'}", "--silence=2.0"
+    with AppServer((*RECORDING_APP, *options)) as server:
+        move(server, *POSTURES, *POSTURES, *POSTURES)
+        with windows.open(server.url, window=WIDE) as shown:
+            document = shown.page
+            document.wait_for_function("() => document.querySelector('#timeline .now')?.max > 2")
+            # The process that records begins a few seconds after the arm.
+            place(shown, document.evaluate("document.querySelector('#timeline .now').max - 0.5"))
+            document.wait_for_function(
+                f"() => ({RED_OF_BAR})() !== null && document.body.innerText.includes('Recorded')"
+            )
+            column = document.evaluate(RED_OF_BAR)
+            document.wait_for_timeout(300)
+            assert document.evaluate(RED_OF_BAR) == column
+            document.get_by_text("Back to live").click()
+            document.wait_for_selector("#cameras [data-old=false] canvas:visible")
+            document.wait_for_function(f"column => ({RED_OF_BAR})() !== column", arg=column)

@@ -17,6 +17,8 @@ declare namespace Page {
     kept: Kept;
     /** The frame of viser's page, the element round it, and the name of this page. */
     scene: HTMLIFrameElement; stage: HTMLElement; name: string;
+    /** The moment of a recording that the scene shows; null while it shows the present. */
+    past: { of: string, t: number } | null;
   }
 
   /** What viser's page offers to this one. */

@@ -68,6 +68,7 @@ class PlaybackRoutes:
             Route(f"{path}/hide", self._hide, methods=["POST"]),
             Route(f"{path}/{{name}}/difference", self._difference),
             Route(f"{path}/{{name}}", self._timeline),
+            Route(f"{path}/{{name}}/pictures/{{camera}}", self._picture),
         ]
 
     async def _timeline(self, request: Request) -> Response:
@@ -109,6 +110,22 @@ class PlaybackRoutes:
             return as_json({"moments": moments, "moving": windows.moving})
 
         return await self._store.work.result(show)
+
+    async def _picture(self, request: Request) -> Response:
+        """Return the picture of a camera at a moment of a recording; no content without one."""
+        options = self._context.options
+        if options is not None and options.cameras_for == "drivers":
+            self._context.driver(request, "see the cameras of this server")
+        run = self._run(request, request.path_params["name"])
+        camera, t = request.path_params["camera"], _number(request.query_params.get("t"))
+
+        def picture() -> Response:
+            jpeg = run.picture(camera, t)
+            if jpeg is None:
+                return Response(status_code=HTTPStatus.NO_CONTENT)
+            return Response(jpeg, media_type="image/jpeg")
+
+        return await self._store.work.result(picture)
 
     async def _hide(self, request: Request) -> Response:
         self._context.identity(request)

@@ -19,6 +19,7 @@ from katana450.extensions.recording.files.attempts import (
     tree_events,
     tree_of,
 )
+from katana450.extensions.recording.files.pictures import jpeg_of
 from katana450.extensions.recording.files.recording_file import ChunkSpan, Message, RecordingFile
 from katana450.extensions.recording.files.simulation import (
     TickReader,
@@ -27,6 +28,7 @@ from katana450.extensions.recording.files.simulation import (
 )
 from katana450.extensions.recording.files.spans import Span, spans_of
 from katana450.extensions.recording.messages import (
+    CAMERAS,
     CHECKPOINTS,
     EPISODES,
     EVENTS,
@@ -52,6 +54,9 @@ MAX_BLOCK_BYTES = 32_000_000
 
 STATE_BYTES = 1000
 """Memory of a state besides its message [bytes]."""
+
+PICTURE_SECONDS = 0.5
+"""[s] Time for which a picture of a camera is shown."""
 
 MAX_SOLID_BYTES = 128_000_000
 """Maximum size of the solids of a file [bytes]."""
@@ -221,6 +226,19 @@ class PlaybackRun:
                 if file.index.last_before(CHECKPOINTS, t) is not None:
                     return list(recorded_input(file.index, t, t))
         raise InputError("Nothing complete is recorded before this moment. Choose a later one.")
+
+    def picture(self, camera: str, t: float) -> bytes | None:
+        """Return the last picture of ``camera`` at or before ``t`` [s], a JPEG file; None without.
+
+        Raises InputError for a damaged file.
+        """
+        t -= self._offset
+        with self._lock:
+            for file in reversed(self._files):
+                message = file.index.last_before(CAMERAS + camera, t)
+                if message is not None:
+                    return jpeg_of(message) if t - message.t < PICTURE_SECONDS else None
+        return None
 
     def _places(self, t: float) -> Iterator[_Place]:
         """Yield the blocks in which the state at ``t`` [s] of the files' clock may be."""
