@@ -19,7 +19,8 @@ from katana450.arm.control.lease import Role
 from katana450.extensions.cameras.camera_link import AGE
 from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer
-from tests.cameras.mjpeg_camera import MjpegCamera
+from tests.cameras.mjpeg_camera import MjpegCamera, picture
+from tests.gateway.client import ask, enter
 from tests.gateway.test_access import give
 from tests.waiting import until
 
@@ -33,7 +34,10 @@ def camera() -> Iterator[MjpegCamera]:
 @pytest.fixture(scope="module")
 def server(camera: MjpegCamera) -> Iterator[AppServer]:
     with AppServer(
-        (*APP, f"--camera=table={camera.url}", "--camera=away=http://127.0.0.1:9/")
+        (
+            *(*APP, f"--camera=table={camera.url}", "--camera=away=http://127.0.0.1:9/"),
+            "--camera=mine=browser",
+        )
     ) as it:
         yield it
 
@@ -74,6 +78,34 @@ def test_camera_that_cannot_be_reached_says_why(server: AppServer) -> None:
         until(lambda: "cannot be reached: Connection refused" in str(asked(socket)))
     with opened(server, "none") as socket, pytest.raises(ConnectionClosed, match="no camera none"):
         asked(socket)
+
+
+def share(server: AppServer, query: str, jpeg: bytes, camera: str = "mine") -> tuple[int, str]:
+    """Send a picture as a page does; return the status and the answer."""
+    address = f"{server.url}/api/v1/cameras/{camera}?{query}"
+    status, _, text = ask(address, data=jpeg, Cookie=enter(server.url), Origin=server.url)
+    return status, text.decode()
+
+
+def test_picture_that_a_page_shares_is_shown_with_its_age(server: AppServer) -> None:
+    with opened(server, "mine") as socket:
+        until(lambda: "Nobody shares this camera yet." in str(asked(socket)))
+        assert share(server, "page=a&age=0.2", picture(3)) == (204, "")
+        answer = asked(socket)
+        assert isinstance(answer, tuple)
+        assert 0.2 <= answer[0] < 2.0
+        assert answer[1] == picture(3)
+    status, why = share(server, "page=b&age=0", picture(3))
+    assert status == 409
+    assert "Another window shares" in why
+    for query, jpeg, camera_name, code in (
+        ("page=a&age=0", b"GIF", "mine", 422),
+        ("page=a&age=11", picture(3), "mine", 422),
+        ("page=a&age=x", picture(3), "mine", 422),
+        ("page=a&age=0", bytes(5_000_000), "mine", 413),
+        ("page=a&age=0", picture(3), "table", 404),
+    ):
+        assert share(server, query, jpeg, camera_name)[0] == code
 
 
 def test_arm_is_driven_while_the_process_of_the_cameras_is_away(server: AppServer) -> None:

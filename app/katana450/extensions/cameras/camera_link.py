@@ -3,19 +3,36 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import struct
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Set
 from contextlib import contextmanager, suppress
 from functools import partial
+from http import HTTPStatus
+from multiprocessing.connection import Connection
 
+import msgspec
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from katana450.arm.runtime.pipes.private_listener import PrivateAddress
-from katana450.extensions.cameras.camera_process import PAGE, Picture, received_pictures
+from katana450.arm.runtime.pipes.guarded_pipe import PIPE_ERRORS
+from katana450.arm.runtime.pipes.private_listener import Greeting, PrivateAddress, connect
+from katana450.extensions.cameras.camera_process import (
+    GREETING_SECONDS,
+    PAGE,
+    SHARER,
+    Picture,
+    received_pictures,
+)
+from katana450.extensions.cameras.sources import JPEG, MAX_FRAME_BYTES
 from katana450.server.web.admission import client_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, TOKEN_REQUIRED, Authenticator
+from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, body_of
+from katana450.server.web.http_api import RouteContext
 
 AGE = struct.Struct("<d")
 """Age of a picture [s] before its JPEG file, in a message to a page."""
@@ -76,6 +93,72 @@ class CameraLink:
             for wake in self._wakers:
                 with suppress(RuntimeError):  # Its loop has ended.
                     wake()
+
+
+class CameraSharer:
+    """Sends the pictures that people share to the process of the cameras. For any thread."""
+
+    def __init__(self, address: PrivateAddress) -> None:
+        """Connect to the process at ``address`` with the first picture."""
+        self._address, self._lock = address, threading.Lock()
+        self._connection: Connection | None = None
+
+    def send(self, picture: Picture) -> None:
+        """Send ``picture``. Raises OSError or EOFError while the process is away."""
+        with self._lock:
+            if self._connection is None:
+                self._connection = connect(self._address, Greeting(SHARER), GREETING_SECONDS)
+            try:
+                self._connection.send_bytes(msgspec.msgpack.encode(picture))
+            except OSError:
+                self._connection = None
+                raise
+
+
+MAX_AGE = 10.0
+"""[s] Maximum age of a picture that is shared."""
+
+
+SILENCE = 2.0
+"""[s] Time after the last picture of a page from which another one may share the camera."""
+
+
+class SharedCameras:
+    """Takes pictures of cameras of the machines of people, each by a request.
+
+    A page sends the next one after the answer, so that none waits.
+    """
+
+    def __init__(self, context: RouteContext, address: PrivateAddress, names: Set[str]) -> None:
+        """Take pictures of the cameras ``names`` for the process at ``address``."""
+        self._context, self._sharer = context, CameraSharer(address)
+        # The page whose pictures are taken, and the time of its last one [s].
+        self._sharing = dict.fromkeys(names, ("", -math.inf))
+
+    async def take(self, request: Request) -> Response:
+        """Take a picture, the JPEG file in the body; ``age`` is its age [s], ``page`` its page."""
+        self._context.driver(request, "share a camera")
+        name, page = request.path_params["name"], request.query_params.get("page", "")
+        if name not in self._sharing:
+            raise HTTPException(HTTPStatus.NOT_FOUND, f"Nobody can share a camera {name}."[:100])
+        sharing, last = self._sharing[name]
+        if sharing != page and time.perf_counter() - last < SILENCE:
+            raise HTTPException(NOT_NOW, f"Another window shares the camera {name} already.")
+        jpeg = await body_of(request, MAX_FRAME_BYTES)
+        try:
+            age = float(request.query_params.get("age", ""))
+        except ValueError:
+            age = math.nan
+        if not 0.0 <= age <= MAX_AGE or not jpeg.startswith(JPEG):
+            why = f"A picture is a JPEG file with an `age` of 0 to {MAX_AGE:g} s."
+            raise HTTPException(NOT_UNDERSTOOD, why)
+        self._sharing[name] = page, time.perf_counter()
+        try:
+            picture = Picture(name, time.perf_counter() - age, jpeg)
+            await asyncio.to_thread(self._sharer.send, picture)
+        except PIPE_ERRORS as error:
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, NOT_READY) from error
+        return Response(status_code=HTTPStatus.NO_CONTENT)
 
 
 class CameraSockets:

@@ -27,11 +27,14 @@ from katana450.arm.runtime.pipes.private_listener import (
 )
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.errors import KatanaError
-from katana450.extensions.cameras.sources import frames
+from katana450.extensions.cameras.sources import BROWSER, frames
 from katana450.platform_support import lower_priority
 
-PAGE, RECORDER = "page", "recorder"
-"""Roles of the page's server and of the process that records."""
+PAGE, RECORDER, SHARER = "page", "recorder", "sharer"
+"""Roles of the page's server, of the process that records, and of the page's server again when it
+sends the pictures that people share."""
+
+NOT_SHARED = "Nobody shares this camera yet. Who drives may share one of their own machine."
 
 WAITING = {PAGE: 1, RECORDER: 60}
 """Number of pictures of a camera that wait for each of these, at most; older ones are left out."""
@@ -81,6 +84,9 @@ class CameraReader:
         self._names = tuple(sources)
         self._queues: list[dict[str, deque[Picture]]] = []
         for name, address in sources.items():
+            if address == BROWSER:
+                self._newest[name] = Picture(name, problem=NOT_SHARED)
+                continue
             threading.Thread(
                 target=self._read, args=(name, address), name=f"camera {name}", daemon=True
             ).start()
@@ -106,6 +112,13 @@ class CameraReader:
             for queues in self._queues:
                 queues[picture.camera].append(picture)
             self._changed.notify_all()
+
+    def take(self, connection: Connection, _greeting: Greeting) -> None:
+        """Take the pictures that people share, from the page's server, until that closes."""
+        decoder = msgspec.msgpack.Decoder(Picture)
+        with suppress(*PIPE_ERRORS):
+            while True:
+                self._put(decoder.decode(connection.recv_bytes(MAX_PICTURE_BYTES)))
 
     def send(self, connection: Connection, greeting: Greeting) -> None:
         """Send the newest pictures, and all later ones, until the other end closes ``connection``.
@@ -158,7 +171,7 @@ def run_cameras(config: CamerasConfig, supervisor: SupervisorPipe) -> None:
     """Read the cameras in this process until the server ends."""
     lower_priority()
     reader = CameraReader(config.sources)
-    roles: Roles = dict.fromkeys(WAITING, reader.send)
+    roles: Roles = {PAGE: reader.send, RECORDER: reader.send, SHARER: reader.take}
     listener = PrivateListener(config.address, roles, "the process of the cameras")
     listener.start()
     supervisor.report(READY)

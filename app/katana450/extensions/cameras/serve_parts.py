@@ -32,8 +32,9 @@ def add_serve_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=SOURCE",
-        help="show a camera beside the scene: an http address of MJPEG, or with the extra "
-        f"`cameras` a device (0, /dev/video0), an rtsp address or a film; up to {MAX_CAMERAS}",
+        help="show a camera beside the scene: an http address of MJPEG, `browser` for one that a "
+        "person shares on the page, or with the extra `cameras` a device (0, /dev/video0), an rtsp "
+        f"address or a film; up to {MAX_CAMERAS}",
     )
     parser.add_argument(
         "--cameras-for",
@@ -63,10 +64,10 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
     if len(sources) > MAX_CAMERAS:
         raise ConfigurationError(f"There are {len(sources)} cameras, of at most {MAX_CAMERAS}.")
     from katana450.extensions.cameras.camera_process import CamerasConfig, run_cameras
-    from katana450.extensions.cameras.sources import EXTRA, PURPOSE, is_mjpeg
+    from katana450.extensions.cameras.sources import EXTRA, PURPOSE, needs_extra
     from katana450.extras import require
 
-    if not all(map(is_mjpeg, sources.values())):
+    if any(map(needs_extra, sources.values())):
         require("cv2", EXTRA, PURPOSE)
     # The page's server, which gets the options too, finds the process by it.
     options.camera_process = PrivateAddress(f"{facts.address.name}-cameras", os.urandom(32))
@@ -80,19 +81,24 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
 
 
 def routes(context: RouteContext) -> list[BaseRoute]:
-    """Return the route of the cameras' pictures, and list the cameras in the status of pages."""
+    """Return the routes of the cameras' pictures, and list the cameras in the status of pages."""
     address = getattr(context.options, "camera_process", None)
     if address is None:
         return []
-    from starlette.routing import WebSocketRoute
+    from starlette.routing import Route, WebSocketRoute
 
-    from katana450.extensions.cameras.camera_link import CameraLink, CameraSockets
+    from katana450.extensions.cameras.camera_link import CameraLink, CameraSockets, SharedCameras
+    from katana450.extensions.cameras.sources import BROWSER
     from katana450.server.api.fields import ROOT
 
     names = [name for name, _ in context.options.camera]
-    context.hub.shown = {**context.hub.shown, ENTRY: names}
+    shared = {name for name, source in context.options.camera if source == BROWSER}
+    cameras = [{"name": name, "shared": name in shared} for name in names]
+    context.hub.shown = {**context.hub.shown, ENTRY: cameras}
     drivers_only = context.options.cameras_for == "drivers"
     sockets = CameraSockets(
         CameraLink(address), context.authenticator, names, drivers_only=drivers_only
     )
-    return [WebSocketRoute(f"{ROOT}/cameras/{{name}}", sockets.serve)]
+    path = f"{ROOT}/cameras/{{name}}"
+    sharing = Route(path, SharedCameras(context, address, shared).take, methods=["POST"])
+    return [WebSocketRoute(path, sockets.serve), *([sharing] if shared else [])]

@@ -20,10 +20,13 @@ from katana450.errors import KatanaError
 from katana450.extras import library
 
 EXTRA = "cameras"
-"""Name of the extra for all that is no MJPEG address."""
+"""Name of the extra, see ``needs_extra``."""
 
 PURPOSE = "Cameras of this machine, of RTSP, and films"
 """Cameras that need the extra, as the subject of a sentence."""
+
+BROWSER = "browser"
+"""Address of a camera that a person shares on the page."""
 
 MAX_FRAME_BYTES = 4_000_000
 """[bytes] Maximum size of a picture; one of 640x480 takes 20 to 60 kB."""
@@ -60,8 +63,13 @@ class CameraFrame(NamedTuple):
 
 
 def is_mjpeg(address: str) -> bool:
-    """Return whether ``address`` is one of MJPEG over HTTP, which needs no extra."""
+    """Return whether ``address`` is one of MJPEG over HTTP."""
     return urlsplit(address).scheme in ("http", "https")
+
+
+def needs_extra(address: str) -> bool:
+    """Return whether the camera at ``address`` is read by a library of the extra."""
+    return not is_mjpeg(address) and address != BROWSER
 
 
 def frames(address: str) -> Iterator[CameraFrame]:
