@@ -1,11 +1,13 @@
 // Pictures of cameras beside the scene, with their age. Loaded when the server has cameras.
 import { styled, t, write } from "../dom.js";
-import { request } from "../server.js";
+import { messageOf, request } from "../server.js";
 import { html } from "../instruments/shape.js";
 
 const OLD = 300; // ms, age from which a picture is grey
 const LOOK = 100; // ms between two looks at the ages
 const AGAIN = 1000; // ms before the next attempt to connect
+const SIZE = { width: 640, height: 480 }; // px, of a camera of this machine
+const QUALITY = 0.8; // of its pictures
 const AGE_BYTES = 8; // before the JPEG file of a message, the age when it was sent: a float64 [s]
 
 class Camera {
@@ -18,14 +20,46 @@ class Camera {
   /** @type {Page.Context["past"]} */
   #past = null; // the moment whose picture is shown
 
-  /** @param {string} name @param {Page.Context} page */
-  constructor(name, page) {
+  /** @type {MediaStream | null} */
+  #stream = null; // of a camera of this machine that the person shares
+  #share = html("button", { type: "button" }, "Share a camera of this device");
+
+  /** @param {Page.Camera} camera @param {Page.Context} page */
+  constructor({ name, shared }, page) {
     this.page = page;
     this.name = name;
     this.view = html("details", { "aria-label": `${t("Camera")} ${name}` }, html("summary", {}, name, this.#age), this.#canvas, this.#says);
     this.view.addEventListener("toggle", () => (this.view.open ? this.#connect() : this.#socket?.close()));
     this.view.open = matchMedia("(min-width: 900px)").matches;
+    if (shared) this.view.append(this.#share);
+    this.#share.addEventListener("click", () => (this.#stream ? this.#end() : this.#begin().catch((error) => this.#end(error))));
     setInterval(() => this.#look(), LOOK);
+  }
+
+  // Send pictures of a camera of this machine, each after the answer to the one before.
+  async #begin() {
+    if (!navigator.mediaDevices) throw new Error("The browser gives cameras only to pages of this machine or over https.");
+    const stream = (this.#stream = await navigator.mediaDevices.getUserMedia({ video: SIZE }));
+    write(this.#share, "Stop sharing");
+    const video = Object.assign(html("video", {}), { srcObject: stream, muted: true });
+    await video.play();
+    const canvas = new OffscreenCanvas(video.videoWidth, video.videoHeight);
+    while (this.#stream === stream && stream.active) {
+      const made = await new Promise((next) => video.requestVideoFrameCallback((now, { captureTime = now }) => next(captureTime)));
+      canvas.getContext("2d")?.drawImage(video, 0, 0);
+      const body = await canvas.convertToBlob({ type: "image/jpeg", quality: QUALITY });
+      const age = Math.max(performance.now() - made + (this.page.store.trip ?? 0) / 2, 0) / 1000;
+      await request(`api/v1/cameras/${this.name}?page=${this.page.name}&age=${age}`, { method: "POST", body });
+    }
+    this.#end();
+  }
+
+  /** @param {unknown} [error] */
+  #end(error) {
+    for (const track of this.#stream?.getTracks() ?? []) track.stop();
+    this.#stream = null;
+    write(this.#share, "Share a camera of this device");
+    if (error) this.page.toast(messageOf(error));
   }
 
   #connect() {
@@ -113,7 +147,7 @@ export class Card {
 
   /** Show the cameras of a status. @param {Page.Status} status */
   draw({ cameras = [] }) {
-    if (this.#shown === (this.#shown = cameras.join())) return;
-    this.#cards.replaceChildren(...cameras.map((name) => new Camera(name, this.#page).view));
+    if (this.#shown === (this.#shown = JSON.stringify(cameras))) return;
+    this.#cards.replaceChildren(...cameras.map((camera) => new Camera(camera, this.#page).view));
   }
 }

@@ -57,6 +57,8 @@ FLAGS = (
     "--disable-background-timer-throttling",
     "--disable-renderer-backgrounding",
     "--disable-backgrounding-occluded-windows",
+    # A camera that shows a test picture, for pages that may use one.
+    "--use-fake-device-for-media-stream",
 )
 # Software renderers, the fastest first. Mesa's llvmpipe draws about twice as fast as SwiftShader,
 # but exists only on Linux with Mesa.

@@ -41,7 +41,8 @@ def camera() -> Iterator[MjpegCamera]:
 @pytest.fixture
 def page(windows: Windows, camera: MjpegCamera) -> Iterator[ViserPage]:
     with ExitStack() as stack:
-        cameras = f"--camera=table={camera.url}", "--camera=away=http://127.0.0.1:9/"
+        sources = f"table={camera.url}", "away=http://127.0.0.1:9/", "mine=browser"
+        cameras = [f"--camera={source}" for source in sources]
         server = stack.enter_context(AppServer((*APP, *cameras)))
         window = windows.open(server.url, window=PORTRAIT, drawing=Drawing.NONE)
         shown = stack.enter_context(window)
@@ -79,6 +80,15 @@ def test_pictures_move_become_grey_when_they_are_old_and_come_back(
     # Folded, it asks for no more pictures.
     document.click("#cameras summary >> nth=0")
     document.wait_for_function("() => !document.querySelector('#cameras summary span').innerText")
+    # A camera of the browser's machine is shown to everybody while the person shares it.
+    document.click("#cameras summary:has-text('mine')")
+    document.wait_for_selector("#cameras :text('Nobody shares this camera yet.')")
+    document.context.grant_permissions(["camera"])
+    document.click("text=Share a camera of this device")
+    document.wait_for_selector("#cameras details:last-child[data-old=false] canvas:visible")
+    assert document.evaluate("document.querySelector('details:last-child canvas').width") == 640
+    document.click("text=Stop sharing")
+    document.wait_for_selector("#cameras details:last-child[data-old=true] canvas:visible")
 
 
 @pytest.mark.long

@@ -24,6 +24,9 @@ declare namespace Page {
   /** What viser's page offers to this one. */
   type Scene = typeof import("../../static/viser/names.js") & typeof import("../../static/viser.js") & typeof import("../../static/fit.js") & { fold?(): void };
 
+  /** A camera; whether a person may share one of their machine as it. */
+  interface Camera { name: string; shared: boolean; }
+
   interface Named { number: number; name: string; }
 
   /** What the server says about the arm and the lease; see `server/service/status.py`. */
@@ -39,8 +42,7 @@ declare namespace Page {
     undo?: string[]; redo?: string[];
     clearance: Clearance | null;
     cautions?: string; episodes?: EpisodesState | null; robot?: Robot | null;
-    /** Names of the cameras. */
-    cameras?: string[];
+    cameras?: Camera[];
   }
 
   /** The two nearest parts: their distance [mm], and the nearest point of each in m of viser's world. */

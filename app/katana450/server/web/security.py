@@ -21,8 +21,8 @@ EVERYWHERE = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
-    "Permissions-Policy": "gamepad=(self), hid=(self), camera=(), geolocation=(), microphone=(), "
-    "payment=(), usb=(), serial=()",
+    "Permissions-Policy": "gamepad=(self), hid=(self), camera=(self), geolocation=(), "
+    "microphone=(), payment=(), usb=(), serial=()",
 }
 
 FOR_PROGRAMS = ("/api/", "/rosbridge")
