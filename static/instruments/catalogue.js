@@ -45,7 +45,7 @@ function knobs(arm, gripper, say) {
     const options = { low: arm.lower[i] * of, high: arm.upper[i] * of, step: 1, full: 1, text: (/** @type {number} */ value) => `${signed(value, 1)}${mark}` };
     return made(`axis-${i + 1}`, arm.links[i].label, options, (value) => ({ do: "joint", axis: i + 1, value: value / of }), ({ goal, q }) => [goal[i] * of, q[i] * of]);
   });
-  const fingers = gripper && made("gripper", "Gripper", { low: 0, high: 100, step: 2, text: percent }, (value) => ({ do: "gripper", angle: gripper.angle(value) }), (state) =>
+  const fingers = gripper && !arm.suction_cup && made("gripper", "Gripper", { low: 0, high: 100, step: 2, text: percent }, (value) => ({ do: "gripper", angle: gripper.angle(value) }), (state) =>
     [gripper.percent(state.gripper_goal), gripper.percent(state.gripper)],
   );
   const speed = made("speed", "Speed", { low: 5, high: 100, step: 5, text: percent }, (value) => ({ do: "speed", value: value / 100 }), (state) => [state.speed * 100, state.speed * 100]);

@@ -10,8 +10,7 @@ const RADIANS = Math.PI / 180;
 const AXES = [["x", "mm"], ["y", "mm"], ["z", "mm"], ["Pitch", "°"], ["Roll", "°"], ["Yaw", "°"], ["Elbow", "°"]];
 const ELBOW = 6; // its place in AXES
 /** @typedef {Record<string, [axis: number, sign: number]>} Moves */
-/** @type {Record<string, "open" | "closed">} */
-const GRIPPER_KEYS = { KeyO: "open", KeyC: "closed" };
+const GRIPPER_KEYS = /** @type {Record<string, "open" | "closed">} */ ({ KeyO: "open", KeyC: "closed" });
 
 export class Steps {
   #say;
@@ -42,7 +41,8 @@ export class Steps {
     pads.after(this.#grid);
     if (arm.gripper) {
       for (const [code, to] of Object.entries(GRIPPER_KEYS)) {
-        this.#gripper.append(button([to === "open" ? "Open" : "Close", html("kbd", {}, code.slice(3))], () => this.#grip(to)));
+        const words = arm.suction_cup ? ["Off", "On"] : ["Open", "Close"];
+        this.#gripper.append(button([words[to === "open" ? 0 : 1], html("kbd", {}, code.slice(3))], () => this.#grip(to)));
       }
       pads.before(this.#gripper);
     }

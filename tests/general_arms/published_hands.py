@@ -184,6 +184,26 @@ def hand_urdf(arm: str, hand: list[J | Box]) -> str:
     return chain_urdf("arm", HANDS[arm][0]).replace("</robot>", text)
 
 
+CUP_HOLDER: list[J | Box] = [
+    J("mount", "fixed", "tool0", "holder"),
+    Box("holder", (0.04, 0.04, 0.06), (0.0, 0.0, 0.03)),
+    J(
+        *("suction_joint", "prismatic", "holder", "suction_cup", (0.0, 0.0, 0.06)),
+        limits=(0.0, 0.015),
+        speed=0.05,
+    ),
+    J("tip", "fixed", "holder", "tcp", (0.0, 0.0, 0.08)),
+]
+
+
+def suction_urdf(radius: float) -> str:
+    """Return the URDF of a UR5e with a suction cup of that radius [m]."""
+    shape = f'<geometry><cylinder radius="{radius}" length="0.02"/></geometry>'
+    cup = f'<collision><origin xyz="0 0 0.01"/>{shape}</collision>'
+    link = '<link name="suction_cup">'
+    return hand_urdf("UR5e", CUP_HOLDER).replace(link, link + cup)
+
+
 def so101_urdf() -> str:
     """Return the URDF of the included SO-101, which names its meshes by their whole paths."""
     file = INCLUDED["so101"]

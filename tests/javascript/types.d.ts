@@ -11,8 +11,8 @@ declare namespace Api {
   interface Arm { is: "arm"; id?: number | string | null; name: string; joints: string[]; lower: number[];
     upper: number[]; speed: number[]; acceleration: number[]; jerk: number[]; ready: number[];
     tools: Record<string, number[][]>; default_tool: string | null; gripper: [number, number, number] | null;
-    gripper_slides: boolean; T_base_shoulder: number[][] | null; slides: boolean[]; links: JointLink[];
-    joints_only: string; freedoms?: number; turns_elbow?: boolean; }
+    gripper_slides: boolean; suction_cup: boolean; T_base_shoulder: number[][] | null; slides: boolean[];
+    links: JointLink[]; joints_only: string; freedoms?: number; turns_elbow?: boolean; }
   type ArmAct = "calibrate" | "connect" | "disconnect" | "engage" | "release" | "unblock";
   interface Ask { do: "ask"; id?: number | string | null; revocations?: number | null; made?: number | null; }
   interface Attach { do: "attach"; name: string; to: Attachment; T?: number[][] | null; id?: number | string | null;

@@ -46,6 +46,7 @@ def arm(*, gripper: bool = True) -> answers.Arm:
         default_tool=None,
         gripper=(-0.4, 0.3, 0.7) if gripper else None,
         gripper_slides=False,
+        suction_cup=False,
         T_base_shoulder=None,
         slides=[False] * 5,
         links=[],

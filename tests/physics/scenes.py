@@ -13,7 +13,7 @@ from katana450.maths.collision.world import Part, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.physics.model import BodyMotion, RigidBody
-from katana450.maths.physics.simulation import BodySimulation, poses_of
+from katana450.maths.physics.simulation import BodySimulation
 from tests.ticks import TICK
 
 SIDE = 0.05
@@ -100,7 +100,7 @@ class Scene:
 
 
 def pose_of(motion: BodyMotion, name: str) -> FloatArray:
-    return poses_of(motion)[name]
+    return motion.poses[name]
 
 
 def position(motion: BodyMotion, name: str) -> FloatArray:

@@ -20,13 +20,15 @@ from katana450.maths.motion.limiter import Limits
 class GripperModel:
     """The driven finger joint: its closed and its open end [rad] and maximum speed [rad/s].
 
-    The numbers of a sliding joint are in m and m/s. An arm without fingers has an empty range.
+    The numbers of a sliding joint are in m and m/s. An arm without fingers has an empty range. A
+    suction cup (``is_cup``) is on unless it is open.
     """
 
     closed: float
     opened: float
     speed: float
     slides: bool = False
+    is_cup: bool = False
 
     @property
     def lower(self) -> float:

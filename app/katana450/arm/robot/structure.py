@@ -38,7 +38,9 @@ ARM_JOINTS = 5
 MIN_ARM_DEPTH = 3
 """Minimum number of consecutive joints of a branch that is an arm, not a finger or a wheel."""
 
-FINGER = re.compile(r"finger|gripper|jaw|claw|knuckle|grasp|clamp|pincer|rh_[lr]\d", re.IGNORECASE)
+FINGER = re.compile(
+    r"finger|gripper|jaw|claw|knuckle|grasp|clamp|pincer|suction|vacuum|rh_[lr]\d", re.IGNORECASE
+)
 """Words in the name of a joint or of its link that suggest a finger."""
 
 WRIST = re.compile("wrist|roll|rot|yaw|pitch|twist|tilt|flex", re.IGNORECASE)

@@ -32,6 +32,7 @@ from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.physics import model as physics
+from katana450.maths.physics.suction import SEAL_GAP, SuctionCup
 from katana450.settings import Settings
 
 GRAVITY = 9.81
@@ -90,6 +91,7 @@ class HandDrive(NamedTuple):
         stiffness, force: stiffness of the drive of each of them, and its greatest force
             [N m/rad or N/m, N m or N].
         fingers: number of finger joints, with those that follow.
+        suction: force of a suction cup, which is all of ``links`` [N]; 0 for fingers.
     """
 
     links: frozenset[str]
@@ -97,6 +99,7 @@ class HandDrive(NamedTuple):
     stiffness: float
     force: float
     fingers: int
+    suction: float = 0.0
 
 
 def grip_of(robot: Robot) -> HandDrive | None:
@@ -108,6 +111,9 @@ def grip_of(robot: Robot) -> HandDrive | None:
     if grasping is None or world is None:
         return None
     drive, variable = grasping.drive, world.linkage.variable
+    if isinstance(drive, SuctionCup):
+        cup = frozenset(part.name for part in world.parts if part.mover == drive.palm)
+        return HandDrive(cup, (), 0.0, 0.0, 0, drive.force)
     links = frozenset(
         part.name
         for part in world.parts
@@ -265,6 +271,10 @@ LINK_FRICTION = physics.LINK_FRICTION, physics.SPIN_FRICTION, physics.ROLLING_FR
 HAND_FRICTION = physics.PAD_FRICTION, physics.PAD_SPIN, physics.ROLLING_FRICTION
 """[1, m, m] Friction of links and of what holds: against sliding, spinning and rolling."""
 
+CUP = {"gap": repr(SEAL_GAP)}
+"""Attributes of a suction cup, which pulls what it almost touches too. Since MuJoCo 3.10 a gap
+presses nothing."""
+
 LEAST_MASS, LEAST_INERTIA = "1e-4", "1e-8"
 """[kg, kg m^2] Minimum of a moving body, for robots whose file states no masses."""
 
@@ -341,7 +351,8 @@ class _Model:
         defaults = ET.SubElement(root, "default")
         ET.SubElement(defaults, "geom", {"friction": _numbers(LINK_FRICTION), **CONTACT})
         holds = ET.SubElement(defaults, "default", {"class": HAND})
-        ET.SubElement(holds, "geom", friction=_numbers(HAND_FRICTION), condim="4")
+        cup = CUP if self._grip is not None and self._grip.suction else {}
+        ET.SubElement(holds, "geom", {"friction": _numbers(HAND_FRICTION), "condim": "4", **cup})
         root.append(self._assets)
         for material, name in self._materials.items():
             ET.SubElement(
@@ -440,15 +451,21 @@ class _Model:
                 },
             )
 
+        if self._grip is not None and self._grip.suction:
+            cup = {"name": "suction", "body": _body(min(self._grip.links)), "ctrlrange": "0 1"}
+            cup["gain"] = _numbers([self._grip.suction], 5)
+            ET.SubElement(actuators, "adhesion", cup)
+
     def _add_keyframes(self, root: ET.Element) -> None:
         frames = ET.SubElement(root, "keyframe")
+        off = [0.0] if self._grip is not None and self._grip.suction else []
         for name, values in keyframes(self._robot).items():
             ET.SubElement(
                 frames,
                 "key",
                 name=name,
                 qpos=_numbers([values[joint.name] for joint in self._in_order()]),
-                ctrl=_numbers([values[joint] for joint in self._robot.driven]),
+                ctrl=_numbers([*(values[name] for name in self._robot.driven), *off]),
             )
 
     def _in_order(self) -> Iterator[Joint]:

@@ -1,13 +1,16 @@
-"""The two sides of a hand, and the end of the range of its joint at which they are closed.
+"""The two sides of a hand or its suction cup, and the end of the range at which it is closed.
 
 Links that one joint moves rigidly together form a group. The two groups that move most against each
 other are the fingertips. A group that stands on one side and moves with its fingertip, such as the
 bars of a linkage, belongs to that side. All others belong to neither side.
 If all groups move the same way, they are the moving jaw, and a body of the palm is the fixed one.
+A suction cup is a single link on a joint that slides, named for it. It is closed when it is out.
 """
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -22,12 +25,16 @@ from katana450.maths.collision.engine import Placement, Witness, distance, witne
 from katana450.maths.collision.shape import CollisionShape, half_space, placement, sphere
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry import se3
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.physics.suction import SuctionCup
 
 PLANE_DISTANCE: Final = 10.0
 """[m] Distance of the planes from which the extent of bodies is measured."""
 
 HALF_SPACE: Final = half_space()
+
+SUCTION: Final = re.compile("suction|vacuum", re.IGNORECASE)
+"""Words in the name of a link that is a suction cup."""
 
 PROBE: Final = sphere(1e-5)
 """The ball that stands for a point."""
@@ -171,6 +178,9 @@ def with_sides(world: CollisionWorld, hand: Hand) -> Hand:
     """Return ``hand`` with its sides and its closed end; unchanged if they are not understood."""
     if not hand.fingers:
         return hand
+    fingers = [part for part in world.parts if part.name in hand.fingers]
+    if SUCTION.search(fingers[0].name) and fingers[0].mover in world.linkage.sliding:
+        return _with_cup(world, hand, fingers)
     try:
         sides = sides_of(world, hand)
     except InputError:
@@ -182,6 +192,35 @@ def with_sides(world: CollisionWorld, hand: Hand) -> Hand:
         gripper=sides.gripper,
         sides=tuple(tuple(part.name for part in side) for side in sides.parts if side),
         fixed_jaw=() if jaw is None else palm,
+    )
+
+
+def _with_cup(world: CollisionWorld, hand: Hand, fingers: Sequence[Part]) -> Hand:
+    """Return ``hand`` with the suction cup of the links ``fingers``, which point out of the palm.
+
+    Its rim is as wide as they are.
+    """
+    group, gripper = fingers[0].mover, hand.gripper
+    low, high = (
+        PlacedBodies(world, fingers, hand.palm, end) for end in (gripper.lower, gripper.upper)
+    )
+    palm = [part for part in world.parts if part.mover == hand.palm]
+    T = low.T_palm_group(group)
+    axis = T[:3, :3] @ world.linkage.axis[group]
+    out = low.middle - PlacedBodies(world, palm, hand.palm, gripper.lower).middle
+    axis = math.copysign(1.0, float(out @ axis)) * axis
+    across = _with_z(axis)[:, :2].T
+    radius = 0.5 * min(low.reach(side) + low.reach(-side) for side in across)
+    rim = low.middle + (low.reach(axis) - low.middle @ axis) * axis
+    T_group_palm = se3.inverse(T)
+    rim, axis = (T_group_palm @ (*rim, 1.0))[:3], T_group_palm[:3, :3] @ axis
+    ends = gripper.upper, gripper.lower
+    closed, opened = ends if float((high.middle - low.middle) @ out) > 0.0 else ends[::-1]
+    return replace(
+        hand,
+        gripper=replace(gripper, closed=closed, opened=opened, is_cup=True),
+        sides=(hand.fingers,),
+        cup=SuctionCup(group, frozen(rim), frozen(axis), radius),
     )
 
 

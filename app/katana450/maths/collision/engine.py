@@ -10,6 +10,8 @@ from __future__ import annotations
 import ctypes
 import re
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
@@ -336,3 +338,17 @@ def _function() -> Any:
     function = library().mj_geomDistance
     function.restype = ctypes.c_double
     return function
+
+
+@contextmanager
+def silence() -> Iterator[None]:
+    """Keep MuJoCo from writing warnings to the console and to a file in the working folder."""
+    import mujoco
+
+    usual, config = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    config.logto_console = config.logto_file = False
+    config.set()
+    try:
+        yield
+    finally:
+        usual.set()

@@ -14,9 +14,10 @@ from katana450.maths.collision.engine import KINDS, hull_triangles
 from katana450.maths.collision.linkage import GROUND, Linkage
 from katana450.maths.collision.shape import CollisionShape
 from katana450.maths.collision.world import Part
-from katana450.maths.geometry import so3
+from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import BoolArray, FloatArray, frozen
 from katana450.maths.physics.joint import BodyJoint
+from katana450.maths.physics.suction import Seal, SuctionCup
 from katana450.maths.water.units import GRAVITY
 
 REST_TIME = 0.25
@@ -78,6 +79,7 @@ class BodyMotion:
         fingers: (f, 2) place and velocity of the joint of each finger [rad or m]; (0, 2) while none
             of them touches a body: they are at their setpoint then.
         contacts: the contacts of the fingers with bodies.
+        seal: that of a suction cup; None if it is off or touches nothing.
     """
 
     names: tuple[str, ...]
@@ -87,11 +89,23 @@ class BodyMotion:
     rest_time: FloatArray
     fingers: FloatArray = field(default_factory=lambda: frozen(np.empty((0, 2))))
     contacts: tuple[FingerContact, ...] = ()
+    seal: Seal | None = None
 
     @property
     def resting(self) -> BoolArray:
         """(b,) True for a body at rest: it stays where it is until something wakes it."""
         return np.asarray(self.rest_time >= REST_TIME)
+
+    @property
+    def poses(self) -> dict[str, FloatArray]:
+        """Pose (4, 4) of each body in the base frame."""
+        rows = zip(self.names, self.place, strict=True)
+        return {name: frozen(pose_at(place)) for name, place in rows}
+
+
+def pose_at(place: FloatArray) -> FloatArray:
+    """Return the pose (4, 4) with the position [m] and quaternion ``place`` (7,)."""
+    return se3.from_rotation_translation(so3.from_quaternion(place[3:]), place[:3])
 
 
 @lru_cache(maxsize=256)
@@ -215,13 +229,13 @@ def compile_model(
     linkage: Linkage,
     parts: Sequence[Part],
     bodies: Sequence[RigidBody],
-    drive: FingerDrive | None = None,
+    drive: FingerDrive | SuctionCup | None = None,
 ) -> Model:
     """Return the model of ``bodies`` among the ``parts`` of the arm and its environment.
 
     The free bodies come before those on joints, which meet no part of the ground. That
-    stands still. The groups of the ``drive`` are moved by it, all others of the ``linkage`` from
-    outside.
+    stands still. The groups of a ``drive`` of fingers are moved by it, all others of the
+    ``linkage`` from outside.
     """
     import mujoco
 
@@ -242,7 +256,7 @@ def compile_model(
             _add_joint(frame, body.joint)
         builder.add_body(frame, body)
     frames = {GROUND: spec.worldbody}
-    variable = None if drive is None else drive.variable
+    variable = drive.variable if isinstance(drive, FingerDrive) else None
     fingers = tuple(g for g in range(1, linkage.count) if linkage.variable[g] == variable)
     moved = {part.mover for part in parts} | {int(linkage.parent[group]) for group in fingers}
     links = tuple(sorted(moved - {GROUND, *fingers}))
@@ -259,9 +273,9 @@ def compile_model(
         parent = int(linkage.parent[group])
         T = _shifted(linkage.T_parent_mover[group], origins[parent])
         frames[group] = builder.add_finger(frames[parent], linkage, group, T)
-    if drive is not None and fingers:
+    if isinstance(drive, FingerDrive) and fingers:
         builder.add_drive(linkage, fingers, drive)
-    # A jaw of the palm holds as a finger does.
+    # A jaw of the palm, or a cup, holds as a finger does.
     hand = {*fingers, *(() if drive is None else (drive.palm,))} - {GROUND}
     for part in parts:
         places = tuple(_shifted(T, origins[part.mover]) for T in part.T_mover_shape)

@@ -6,17 +6,16 @@ A step is a pure function: all that MuJoCo remembers is in the motion of the bod
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from katana450.maths.collision.engine import addresses, library
+from katana450.maths.collision.engine import addresses, library, silence
 from katana450.maths.collision.linkage import Linkage
 from katana450.maths.collision.world import Part
-from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import BoolArray, FloatArray, frozen
 from katana450.maths.physics.model import (
     BODY,
@@ -31,8 +30,10 @@ from katana450.maths.physics.model import (
     RigidBody,
     compile_model,
     inside_of,
+    pose_at,
     radius_of,
 )
+from katana450.maths.physics.suction import Seal, SuctionCup, gap_of, pull
 
 SLOW = 5e-3
 """[m/s, and 10 times as many rad/s] Speed below which a body is slow."""
@@ -103,7 +104,7 @@ class BodySimulation:
         linkage: Linkage,
         parts: Sequence[Part],
         bodies: Sequence[RigidBody],
-        drive: FingerDrive | None = None,
+        drive: FingerDrive | SuctionCup | None = None,
     ) -> None:
         """Compile the model, which takes some milliseconds. See ``compile_model``."""
         import mujoco
@@ -125,7 +126,10 @@ class BodySimulation:
         self._free = free = len(bodies) - len(self._joints)
         slides = np.array([joint.slides for joint in self._joints], dtype=bool)
         self._joint_limits = np.where(slides, MAX_SPEED, 10.0 * MAX_SPEED)
-        # Where the values of the links begin.
+        # The number of the body of a suction cup, and where the values of the links begin.
+        self._cup = 0
+        if isinstance(drive, SuctionCup):
+            self._cup = 1 + len(bodies) + self._model.links.index(drive.palm)
         self._link_q, self._link_v = 7 * free + len(self._joints), 6 * free + len(self._joints)
         self._bodies_of = {owner: body.name for body in bodies for owner in body.owners}
         self._radii = np.array([radius_of(body) for body in bodies])
@@ -191,6 +195,8 @@ class BodySimulation:
         dt: float,
         rates: Rates | None = None,
         grasp: float | None = None,
+        *,
+        suction: str | None = None,
     ) -> BodyMotion:
         """Return the motion after ``dt`` [s], in which the arm moves from ``x`` to ``towards``.
 
@@ -200,11 +206,13 @@ class BodySimulation:
         rates: velocities (k,) at ``x`` and at ``towards`` [rad/s or m/s]; None for even speed.
         grasp: goal of the drive of the fingers while they touch a body [rad or m]; None for that of
             ``towards``.
+        suction: the object that a suction cup holds; "" for none, None while it is off.
         """
         data, count = self._data, len(self._names)
         motion = self._with_woken(motion, dt)
         # What the fingers touch can be moved by them at any time.
-        touched = {self._bodies_of.get(name, name) for _, name, *_ in motion.contacts}
+        names = [contact.body for contact in motion.contacts] + [suction or ""]
+        touched = {self._bodies_of.get(name, name) for name in names}
         resting = motion.resting & [name not in touched for name in self._names]
         many = bool(np.count_nonzero(~resting) > MANY)
         ways = dt * PARTING_SPEED * self._crowding(motion) if many else np.zeros((count, 3))
@@ -220,7 +228,8 @@ class BodySimulation:
         self._place_links(x, towards, rates, dt, h)
         goals = self._drive_goals(motion, x, towards, dt, grasp, steps)
         data.qacc_warmstart[:] = motion.memory
-        lost = not self._advance(goals, many=many)
+        data.xfrc_applied[:] = 0.0
+        lost = not self._advance(goals, suction or "", many=many)
         place, velocity = self._bodies()
         if lost:
             place, velocity = motion.place, np.zeros((count, 6))
@@ -249,14 +258,19 @@ class BodySimulation:
             frozen(rest_time),
             frozen(fingers),
             contacts,
+            None if suction is None or lost else self._seal(suction, contacts),
         )
 
-    def _advance(self, goals: FloatArray, *, many: bool) -> bool:
-        """Let the engine make a step for each of the ``goals``; return False without a motion."""
+    def _advance(self, goals: FloatArray, held: str, *, many: bool) -> bool:
+        """Let the engine make a step for each of the ``goals``; return False without a motion.
+
+        ``held``: the object that a suction cup holds; "" for none.
+        """
+        pulled = self._names.index(self._bodies_of.get(held, held)) + 1 if held else 0
         data, count = self._data, self._free
         data.time = 0.0
         data.warning.number[:] = 0
-        with _silence():
+        with silence():
             for goal in goals:
                 data.ctrl[:] = goal
                 before = data.qpos[: 7 * count].reshape(-1, 7).copy()
@@ -268,6 +282,8 @@ class BodySimulation:
                 quick = data.ncon > MANY_CONTACTS or (many and deep.any())
                 self._choose_solver(quick=bool(quick))
                 self._limit_friction()
+                if pulled and isinstance(self._drive, SuctionCup):
+                    pull(data, self._drive, self._cup, pulled)
                 self._second_half(*self._addresses)
                 if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
                     return False
@@ -347,7 +363,7 @@ class BodySimulation:
         q[: 7 * free], v[: 6 * free] = motion.place[:free].ravel(), motion.velocity[:free].ravel()
         rows = zip(self._joints, motion.place[free:], motion.velocity[free:], strict=True)
         for number, (joint, place, velocity) in enumerate(rows):
-            change = _pose_at(place)
+            change = pose_at(place)
             change[:3, 3] -= joint.point
             q[7 * free + number] = joint.position(change)
             v[6 * free + number] = (
@@ -499,6 +515,17 @@ class BodySimulation:
             for names, total in sums.items()
         )
 
+    def _seal(self, held: str, contacts: Sequence[FingerContact]) -> Seal | None:
+        """Return how the suction cup stands on what it touches, or ``held``; None for nothing."""
+        cup = self._drive
+        if not (contacts or held) or not isinstance(cup, SuctionCup):
+            return None
+        geoms, gap = gap_of(self._compiled, self._data, cup, self._cup)
+        item, owners = held or contacts[0].body, self._model.owners
+        # A rim that reaches beyond the face is open.
+        is_covered = min(geoms) >= 0 and {owners[geom] for geom in geoms} == {item}
+        return Seal(item, gap if is_covered else 2.0 * cup.radius)
+
     def _limit_friction(self) -> None:
         """Limit the deceleration that friction aims at, because the engine adds it to the lift.
 
@@ -564,31 +591,5 @@ def _is_slow(velocity: FloatArray, speed: float) -> BoolArray:
     return np.asarray((speeds[:, :3].max(1) < speed) & (speeds[:, 3:].max(1) < 10.0 * speed))
 
 
-def poses_of(motion: BodyMotion) -> dict[str, FloatArray]:
-    """Return the pose (4, 4) of each body in the base frame."""
-    return {
-        name: frozen(_pose_at(place))
-        for name, place in zip(motion.names, motion.place, strict=True)
-    }
-
-
-def _pose_at(place: FloatArray) -> FloatArray:
-    return se3.from_rotation_translation(so3.from_quaternion(place[3:]), place[:3])
-
-
 def _place(T: FloatArray) -> FloatArray:
     return np.concatenate((T[:3, 3], so3.to_quaternion(T[:3, :3])))
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Keep MuJoCo from writing warnings to the console and to a file in the working folder."""
-    import mujoco
-
-    usual, config = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
-    config.logto_console = config.logto_file = False
-    config.set()
-    try:
-        yield
-    finally:
-        usual.set()

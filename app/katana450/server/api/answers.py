@@ -358,6 +358,7 @@ class Arm(Answer, frozen=True, kw_only=True):
         default_tool: Name of the tool frame that is used at first; null without tools.
         gripper: Finger joint closed and open [rad], and its speed [rad/s]; null without fingers.
         gripper_slides: Whether the fingers slide; the numbers of ``gripper`` are in m and m/s then.
+        suction_cup: Whether the gripper is a suction cup, which is on unless it is open.
         T_base_shoulder: (4, 4) Frame {S} in the base frame; null for a mechanism that has only
             joints.
         slides: (n,) Whether each joint slides.
@@ -379,6 +380,7 @@ class Arm(Answer, frozen=True, kw_only=True):
     default_tool: str | None
     gripper: tuple[float, float, float] | None
     gripper_slides: bool
+    suction_cup: bool
     T_base_shoulder: list[Numbers] | None
     slides: list[bool]
     links: list[JointLink]

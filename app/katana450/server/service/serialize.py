@@ -42,6 +42,7 @@ UNITS = {
     control.Reason.PITCH_CHANGED: "rad",
     control.Reason.ROLL_CHANGED: "rad",
     control.Reason.LOPSIDED: "m",
+    control.Reason.LEAKING: "m",
     control.Reason.SLIDING: "N",
     control.Reason.SLIPPED: "N",
     control.Reason.CRUSHED: "N",
@@ -154,7 +155,7 @@ def touch(hand: Hand, now: control.State) -> answers.Touch:
     """Return the forces of the fingers as a part of an answer."""
     return answers.Touch(
         preload=now.squeeze,
-        force_limit=FINGER_FORCE,
+        force_limit=FINGER_FORCE if hand.cup is None else hand.cup.force,
         fingers=[
             answers.FingerForce(finger=name, force=force)
             for name, force in finger_forces(hand, now).items()
@@ -243,6 +244,7 @@ def arm(handle: ArmHandle) -> answers.Arm:
         default_tool=None if mounted is None else mounted.default_tool,
         gripper=(gripper.closed, gripper.opened, gripper.speed) if gripper.moves else None,
         gripper_slides=gripper.slides,
+        suction_cup=gripper.is_cup,
         T_base_shoulder=None if mounted is None else mounted.T_base_shoulder.tolist(),
         slides=list(model.slides),
         links=_joint_links(robot, names),

@@ -108,7 +108,9 @@ class Panel:
             self._gui.add_html(f"<div class='k450'>{why}</div>")
         self._sliders = [self._joint(axis, state, listen) for axis in range(len(self._labels))]
         fingers = self._model.gripper
-        self._gripper = self._finger(state, listen) if fingers.moves else None
+        has_fingers = fingers.moves and not fingers.is_cup
+        self._gripper = self._finger(state, listen) if has_fingers else None
+        self._suction = self._cup(state, listen) if fingers.is_cup else None
         drive = self._gui.add_button_group(
             "Drive",
             tuple(GESTURES),
@@ -159,6 +161,8 @@ class Panel:
             set_slider(slider, factor * float(value))
         if self._gripper is not None:
             set_slider(self._gripper, self._opening(state.gripper_goal))
+        if self._suction is not None:
+            set_value(self._suction, state.gripper_goal != self._model.gripper.opened)
         if self._form is not None:
             self._form.set_controls(state)
 
@@ -202,6 +206,16 @@ class Panel:
         )
         listen(buttons, lambda: cmd.Gripper(ends_of[buttons.value]))
         return slider
+
+    def _cup(self, state: State, listen: Listen) -> viser.GuiInputHandle[bool]:
+        cup = self._model.gripper
+        switch = self._gui.add_checkbox(
+            "Suction",
+            state.gripper_goal != cup.opened,
+            hint="On: the cup goes out to the flat face before it, and holds it. Off: it lets go",
+        )
+        listen(switch, lambda: cmd.Gripper(cup.closed if switch.value else cup.opened))
+        return switch
 
     def _opening(self, angle: float) -> float:
         fingers = self._model.gripper

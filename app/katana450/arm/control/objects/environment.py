@@ -15,7 +15,11 @@ from katana450.maths.collision.clearance import DEPTH_ROUNDING, MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.physics.suction import SuctionCup
 from katana450.maths.water.environment import TableTop
+
+TOUCH_DEPTH = 2e-4
+"""[m] Depth to which a suction cup is pressed into what it touches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +34,7 @@ class Hand:
         gripper: the finger joint.
         sides: names of the fingers on each side of an object, those at the tips first.
         fixed_jaw: names of the parts of the palm against which a single side closes.
+        cup: the suction cup, which is the only finger then; None for fingers.
     """
 
     palm: int
@@ -38,11 +43,12 @@ class Hand:
     gripper: GripperModel
     sides: tuple[tuple[str, ...], ...]
     fixed_jaw: tuple[str, ...] = ()
+    cup: SuctionCup | None = None
 
     @property
     def can_hold(self) -> bool:
-        """True if it has two sides, between which objects are held."""
-        return len(self.gripping_sides) >= 2
+        """True if it is a suction cup, or has two sides, between which objects are held."""
+        return self.cup is not None or len(self.gripping_sides) >= 2
 
     @property
     def gripping_sides(self) -> tuple[tuple[str, ...], ...]:
@@ -155,20 +161,23 @@ class Environment:
     def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
         """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m].
 
-        They touch and push what they can hold, so these pairs have no minimum.
+        They touch and push what they can hold, so these pairs have no minimum. A suction cup has no
+        limited force, and stops where it touches.
         """
+        hand = self.hand
         holdable = {
             scene_object.name
             for scene_object in objects
             if scene_object.can_be_held and not scene_object.carried
         }
-        fingers = set(self.hand.fingers if self.hand is not None and self.hand.can_hold else ())
+        fingers = set(hand.fingers if hand is not None and hand.can_hold else ())
+        minimum = -np.inf if hand is None or hand.cup is None else -TOUCH_DEPTH
         names = [world.parts[number].name for number in world.part_of.tolist()]
         touching = [
             bool({names[a], names[b]} & holdable and {names[a], names[b]} & fingers)
             for a, b in zip(world.first.tolist(), world.second.tolist(), strict=True)
         ]
-        return np.where(touching, -np.inf, MIN_CLEARANCE)
+        return np.where(touching, minimum, MIN_CLEARANCE)
 
     def pose(self, scene_object: SceneObject, x: FloatArray) -> FloatArray:
         """Return the pose (4, 4) of ``scene_object`` in the base frame.

@@ -10,6 +10,7 @@ from katana450.arm.control.session.goals import without_finding
 from katana450.arm.control.state.scene_objects import SceneObject, named, placed
 from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.maths.physics.model import FingerContact
+from katana450.maths.physics.suction import Seal
 
 FINGER_FORCE = 10.0
 """[N] Greatest force of the fingers of one side. Assumed, as the current of a small motor allows.
@@ -65,10 +66,13 @@ def _gripped(environment: Environment, hand: Hand, before: State, state: State, 
         return _holding(environment, hand, before, state, dt)
     if not gripper.is_wider(state.gripper_setpoint, state.gripper_goal):
         opening = gripper.is_wider(state.gripper_goal, state.gripper)
-        return without_finding(state, Reason.LOPSIDED) if opening else state
+        return without_finding(state, Reason.LOPSIDED, Reason.LEAKING) if opening else state
     moved = abs(state.gripper_setpoint - before.gripper_setpoint)
+    is_stopped = moved <= STALL_RATIO * gripper.speed * dt
+    if hand.cup is not None:
+        return _on_cup(environment, hand, state, is_stopped=is_stopped)
     contacts = contacts_of(state)
-    if not contacts or moved > STALL_RATIO * gripper.speed * dt:
+    if not (contacts and is_stopped):
         return state
     for scene_object in state.objects:
         if scene_object.can_be_held and not scene_object.fixed:
@@ -93,6 +97,56 @@ def side_forces(hand: Hand, contacts: tuple[FingerContact, ...], name: str) -> l
     ]
 
 
+def suction_of(hand: Hand | None, state: State) -> str | None:
+    """Return the name of what a suction cup holds; "" if it holds nothing, None if it is off.
+
+    It is off while it opens, and at its open end.
+    """
+    if hand is None or hand.cup is None:
+        return None
+    gripper, goal = hand.gripper, state.gripper_goal
+    if gripper.is_wider(goal, state.gripper_setpoint) or not gripper.is_wider(gripper.opened, goal):
+        return None
+    return "" if state.held is None else state.held.name
+
+
+def _seal_of(state: State) -> Seal | None:
+    return None if state.bodies is None else state.bodies.seal
+
+
+def _on_cup(environment: Environment, hand: Hand, state: State, *, is_stopped: bool) -> State:
+    """Return ``state`` with the suction cup on the flat face of an object, or leaking."""
+    seal = _seal_of(state)
+    item = None if seal is None else named(state.objects, seal.item)
+    if seal is None or item is None or not item.can_be_held or item.fixed:
+        return state
+    if seal.is_tight:
+        return _held(environment, _stopped(state), item, 0.0)
+    if not is_stopped:
+        return state
+    leaking = Finding(Reason.LEAKING, seal.gap, parts=(hand.fingers[0], item.name))
+    stopped = _stopped(state)
+    return replace(stopped, findings=(*stopped.findings, leaking))
+
+
+def _is_lost(hand: Hand, state: State, name: str) -> bool:
+    """Return whether nothing of ``hand`` holds the object ``name`` any more."""
+    if hand.cup is None:
+        return max(side_forces(hand, contacts_of(state), name)) == 0.0
+    seal = _seal_of(state)
+    return seal is None or seal.item != name or not seal.is_tight
+
+
+def _load(hand: Hand, state: State) -> float:
+    """Return the load of what ``hand`` holds in ``state`` [N]."""
+    load = math.fsum(contact.friction for contact in contacts_of(state))
+    if hand.cup is None:
+        return load
+    # What the pressure does not press against the rim, it bears.
+    pressing = math.fsum(contact.force for contact in contacts_of(state))
+    return math.hypot(hand.cup.force - pressing, load)
+
+
 def _holding(environment: Environment, hand: Hand, before: State, state: State, dt: float) -> State:
     """Return ``state`` with the object still held, let go, or lost."""
     gripper, grip, held = hand.gripper, state.grip, state.held
@@ -105,13 +159,12 @@ def _holding(environment: Environment, hand: Hand, before: State, state: State, 
     if state.bodies is None or gripper.is_wider(state.gripper_goal, free):
         return state
     last = named(before.objects, held.name)
-    load = math.fsum(contact.friction for contact in contacts_of(before))
     reason = None
-    if max(side_forces(hand, state.bodies.contacts, held.name)) == 0.0:
+    if _is_lost(hand, state, held.name):
         touched = bool(contacts_of(before))
         # The contacts of a part that its joint keeps from the middle of the fingers can fail for
         # a tick.
-        is_first = touched if held.joint is not None else not touched
+        is_first = hand.cup is None and (touched if held.joint is not None else not touched)
         if before.grip is None or before.bodies is None or is_first:
             # The fingers have only begun to press on it.
             return state
@@ -120,7 +173,8 @@ def _holding(environment: Environment, hand: Hand, before: State, state: State, 
         reason = Reason.SLIDING
     if reason is None:
         return state
-    cause = Finding(reason, load, parts=(held.name, hand.fingers[0]))
+    limit = 0.0 if hand.cup is None else hand.cup.force
+    cause = Finding(reason, _load(hand, before), parts=(held.name, hand.fingers[0]), limit=limit)
     return replace(state, findings=(cause, *state.findings))
 
 
@@ -172,8 +226,7 @@ def _closed(
 
     They hold it if both sides press on it with ``forces`` [N].
     """
-    state = without_finding(without_finding(state, Reason.CONTACT), Reason.LOPSIDED)
-    stopped = replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
+    stopped = _stopped(state)
     weakest = min(range(len(forces)), key=forces.__getitem__)
     if forces[weakest] < FIRM:
         parts = (hand.gripping_sides[weakest][0], scene_object.name)
@@ -182,6 +235,17 @@ def _closed(
         gap = world.gap(state.x_setpoint, scene_object.name, *hand.gripping_sides[weakest])
         lopsided = Finding(Reason.LOPSIDED, gap, parts=parts)
         return replace(stopped, findings=(*stopped.findings, lopsided))
-    objects = placed(state.objects, environment.taken(scene_object, state.x_setpoint))
     squeeze = abs(state.gripper_setpoint - state.gripper_goal)
-    return replace(stopped, objects=objects, grip=state.gripper_setpoint, squeeze=squeeze)
+    return _held(environment, stopped, scene_object, squeeze)
+
+
+def _stopped(state: State) -> State:
+    """Return ``state`` with the fingers stopped where they are."""
+    state = without_finding(state, Reason.CONTACT, Reason.LOPSIDED)
+    return replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
+
+
+def _held(environment: Environment, state: State, item: SceneObject, squeeze: float) -> State:
+    """Return ``state`` with ``item`` in the hand, pressed with the preload ``squeeze``."""
+    objects = placed(state.objects, environment.taken(item, state.x_setpoint))
+    return replace(state, objects=objects, grip=state.gripper_setpoint, squeeze=squeeze)

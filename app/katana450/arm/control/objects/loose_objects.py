@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from katana450.arm.control.objects.environment import Environment
-from katana450.arm.control.objects.grip import FINGER_FORCE
+from katana450.arm.control.objects.grip import FINGER_FORCE, suction_of
 from katana450.arm.control.objects.pouring import BASIN, CUP, is_vessel
 from katana450.arm.control.state.scene_objects import MAX_COORDINATE, Attachment, SceneObject, Shape
 from katana450.arm.control.state.state import State
@@ -25,8 +25,14 @@ from katana450.maths.collision.shape import CollisionShape, box, cylinder, half_
 from katana450.maths.collision.world import Part, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.physics.model import BodyMotion, FingerDrive, RigidBody, volume
-from katana450.maths.physics.simulation import BodySimulation, poses_of
+from katana450.maths.physics.model import (
+    BodyMotion,
+    FingerDrive,
+    RigidBody,
+    volume,
+)
+from katana450.maths.physics.simulation import BodySimulation
+from katana450.maths.physics.suction import SuctionCup
 from katana450.maths.water.environment import Basin, Cup, TableTop, WaterEnvironment
 from katana450.maths.water.units import DENSITY as WATER_DENSITY
 from katana450.maths.water.units import FEMTOLITRE
@@ -171,14 +177,14 @@ class Ball(NamedTuple):
 
 
 class Grasping(NamedTuple):
-    """The fingers as the physics needs them.
+    """The fingers or the suction cup as the physics needs them.
 
     Attributes:
-        drive: their drive.
+        drive: the drive of the fingers, or the cup.
         reach: radius of a ball round the tool point that contains them [m].
     """
 
-    drive: FingerDrive
+    drive: FingerDrive | SuctionCup
     reach: float
 
     @staticmethod
@@ -187,6 +193,9 @@ class Grasping(NamedTuple):
         hand, world = environment.hand, environment.bodies
         if hand is None or world is None or not hand.can_hold or not hand.gripper.moves:
             return None
+        if hand.cup is not None:
+            stroke = hand.gripper.upper - hand.gripper.lower
+            return Grasping(hand.cup, stroke + 2.0 * hand.cup.radius)
         linkage = world.linkage
         parts = {part.name: part for part in world.parts}
         variable = int(linkage.variable[parts[hand.fingers[0]].mover])
@@ -269,7 +278,8 @@ class LooseObjects:
             return replace(state, bodies=motion)
         grasp = self._grasp(before, state, motion, simulation.finger_joint(motion))
         rates = np.append(before.motion.qd, 0.0), np.append(state.motion.qd, 0.0)
-        motion = simulation.step(motion, start, end, dt, rates, grasp)
+        suction = suction_of(self._environment.hand, state)
+        motion = simulation.step(motion, start, end, dt, rates, grasp, suction=suction)
         fingers, goal = simulation.finger_joint(motion), state.gripper_goal
         hand = self._environment.hand
         if fingers is not None and hand is not None and grasp == goal and state.grip is None:
@@ -332,7 +342,7 @@ class LooseObjects:
 
     def _shown(self, state: State, motion: BodyMotion) -> tuple[SceneObject, ...]:
         """Return the objects at their places in ``motion``; the same tuple if none has moved."""
-        poses, shown = poses_of(motion), []
+        poses, shown = motion.poses, []
         for scene_object in state.objects:
             T, joint = poses.get(_body_name(scene_object)), scene_object.joint
             if T is not None and joint is not None:

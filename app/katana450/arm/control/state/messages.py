@@ -104,6 +104,12 @@ def _lopsided(finding: Finding) -> str:
     )
 
 
+def _in_hand(finding: Finding, fingers: str, cup: str) -> str:
+    """Return the text of ``fingers`` or a ``cup``, with an object, its load and the limit."""
+    item, numbers = (finding.parts or ("the object",))[0], (finding.amount, finding.limit)
+    return (cup if finding.limit else fingers).format(part(item), *map(short, numbers))
+
+
 REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.STOPPED: lambda f: f"stopped{_within(f)}: press Clear stop, then give a new target",
     Reason.PAUSED: lambda _: "paused: press Resume to continue",
@@ -137,13 +143,23 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
         f"orientation gives way by {short(math.degrees(f.amount))}°"
     ),
     Reason.LOPSIDED: _lopsided,
-    Reason.SLIDING: lambda f: (
-        f"{part((f.parts or ('the object',))[0])} slides in the fingers under a load of "
-        f"{short(f.amount)} N: grip it with more force, or move more slowly"
+    Reason.LEAKING: lambda f: (
+        "{} leaks on {}: its rim is ".format(*map(part, f.parts or ("the cup", "the object")))
+        + f"{short(1e3 * f.amount)} mm from a flat face; switch it off, and set it on a flat face"
     ),
-    Reason.SLIPPED: lambda f: (
-        f"{part((f.parts or ('the object',))[0])} slipped out of the fingers under a load of "
-        f"{short(f.amount)} N: open the gripper, then grip it with more force"
+    Reason.SLIDING: lambda f: _in_hand(
+        f,
+        "{} slides in the fingers under a load of {} N: grip it with more force, or move more "
+        "slowly",
+        "{} slides on the suction cup under a load of {} N, and at most {} N are held: move more "
+        "slowly, or tilt it less",
+    ),
+    Reason.SLIPPED: lambda f: _in_hand(
+        f,
+        "{} slipped out of the fingers under a load of {} N: open the gripper, then grip it with "
+        "more force",
+        "{} came off the suction cup under a load of {} N, and at most {} N are held: take it at "
+        "its middle, or move more slowly",
     ),
     Reason.CRUSHED: lambda f: (
         f"{part((f.parts or ('the object',))[0])} was crushed: {short(f.amount)} N, and it bears "
@@ -231,6 +247,7 @@ ABOUT_NOW = (
     Reason.WAITING,
     Reason.CONTACT,
     Reason.LOPSIDED,
+    Reason.LEAKING,
     Reason.SLIPPED,
     Reason.CRUSHED,
     Reason.SLOW_ZONE,

@@ -71,6 +71,7 @@ class Reason(Enum):
     ORIENTATION_CHANGED = "orientation changed"
     NOT_AT_START = "not at the start"
     LOPSIDED = "one finger only"
+    LEAKING = "leaking"
     SLIDING = "sliding"
     SLIPPED = "slipped"
     CRUSHED = "crushed"
@@ -123,11 +124,12 @@ class Finding:
             distance of the arm from its start [rad]; for silence and lateness, the time [s]; for a
             tracking error and a measured stop, the angle of a joint [rad]; for an object that
             slides or has slipped, its load [N]; for one that was crushed, the force [N]; for a
-            zone, the maximum speed of the tool [m/s].
+            suction cup that leaks, its gap [m]; for a zone, the maximum speed of the tool [m/s].
         axis: the axis that the finding concerns, counted from 0; None if it concerns no axis.
         parts: the two links or objects that the finding concerns; None if it concerns none.
         time: for a stop, the time until rest [s].
-        limit: for an object that was crushed, the force that it bears [N].
+        limit: for an object that was crushed, the force that it bears, and for one that slides on
+            a suction cup or has slipped off it, that of the cup [N].
     """
 
     reason: Reason

@@ -32,6 +32,7 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.turns import wrapped
+from katana450.maths.physics.suction import SuctionCup
 from katana450.maths.planning.plan import MARGIN
 
 DOWN = 0.5 * math.pi
@@ -178,11 +179,13 @@ class GraspFrame:
             from the palm to the tips, and the fingers close along y; a fixed jaw is at -y.
         opening: distance between the open fingers [m].
         one_jaw: whether one jaw closes against a fixed one.
+        is_cup: whether it is a suction cup.
     """
 
     T_palm_grasp: FloatArray
     opening: float
     one_jaw: bool = False
+    is_cup: bool = False
 
 
 def grasp_frame(
@@ -196,6 +199,8 @@ def grasp_frame(
         raise InputError(NO_FINGERS)
     if world is None or hand is None or not hand.fingers:
         raise InputError(NO_BODIES)
+    if hand.cup is not None:
+        return _cup_frame(world, hand, hand.cup)
     sides = sides_of(world, hand)
     y, opened = sides.y, sides.gripper.opened
     names = " and ".join(part.name for tip in sides.tips for part in tip[:1])
@@ -234,6 +239,22 @@ def grasp_frame(
     origin = (tip - depth) * x + across * y + 0.5 * (low + high) * z
     T = se3.from_rotation_translation(np.column_stack((x, y, z)), origin)
     return GraspFrame(frozen(T), outside - inside, sides.jaw is not None)
+
+
+CUP_PRESS: Final = 2e-3
+"""[m] How much farther than the face a suction cup could go out."""
+
+
+def _cup_frame(world: CollisionWorld, hand: Hand, cup: SuctionCup) -> GraspFrame:
+    """Return the frame of a suction cup: at its rim when it is nearly out, x out of the cup."""
+    x = np.append(np.zeros(int(world.linkage.variable.max())), hand.gripper.closed)
+    poses = world.linkage.poses(x)
+    T = se3.inverse(poses[hand.palm]) @ poses[cup.palm]
+    out = T[:3, :3] @ cup.axis
+    side = snapped(hand.T_palm_tool[:3, 1], frames_of(hand), float(SNAP_COSINE), out)
+    origin = T[:3, :3] @ cup.grasp_point + T[:3, 3] - CUP_PRESS * out
+    R = np.column_stack((out, side, np.cross(out, side)))
+    return GraspFrame(frozen(se3.from_rotation_translation(R, origin)), math.inf, is_cup=True)
 
 
 ROLLING_AXES, PLANAR_AXES = 5, 4

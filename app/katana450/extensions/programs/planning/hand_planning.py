@@ -115,6 +115,7 @@ class HandPlanning:
         one_jaw: whether one jaw closes against a fixed one.
         plane: that of an arm with fewer than six axes; None for others.
         tool: name of the tool frame that grasps; "" for every one.
+        is_cup: whether it is a suction cup, which takes objects from above at their tops.
     """
 
     planning: ToolPlanning
@@ -124,6 +125,7 @@ class HandPlanning:
     one_jaw: bool
     plane: ArmPlane | None
     tool: str = ""
+    is_cup: bool = False
 
     @property
     def tip_distances(self) -> Sequence[float]:
@@ -168,6 +170,8 @@ class HandPlanning:
     ) -> Mapping[str, Sequence[Approach]]:
         """Return all approaches between whose fingers the object fits, or raise InputError."""
         options: Widths = widths(pitches, scene_object, place, side)
+        if self.is_cup:
+            options = {ABOVE: options.get(ABOVE, ())}
         if self.plane is not None:
             options = self._in_plane(self.plane, options)
         return fitting(options, self.opening, one_jaw=self.one_jaw)
@@ -422,5 +426,11 @@ def hand_of(session: Session, T_base_shoulder: FloatArray, state: State) -> Hand
     T_tool_grasp = frozen(se3.inverse(T_palm_tool) @ frame.T_palm_grasp)
     plane = ArmPlane.of(chain, T_tool_grasp, session.ready) if axes < FREE_AXES else None
     return HandPlanning(
-        planning, T_base_shoulder, T_tool_grasp, frame.opening, frame.one_jaw, plane
+        planning,
+        T_base_shoulder,
+        T_tool_grasp,
+        frame.opening,
+        frame.one_jaw,
+        plane,
+        is_cup=frame.is_cup,
     )

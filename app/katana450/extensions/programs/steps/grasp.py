@@ -108,13 +108,13 @@ class Grasp(Step, word="grasp", example="cup"):
                 f"{self.name} cannot be held by the fingers. Set its `can_be_held` to true if they "
                 "may take it."
             )
-        if self.height is None and scene_object.height < MIN_HEIGHT:
+        hand = plan.hand
+        if not hand.is_cup and self.height is None and scene_object.height < MIN_HEIGHT:
             raise InputError(
                 f"{self.name} is {1e3 * scene_object.height:.1f} mm high, and the minimum is "
                 f"{1e3 * MIN_HEIGHT:.0f} mm: the fingertips stay {1e3 * MARGIN:.0f} mm over what "
                 "an object stands on."
             )
-        hand = plan.hand
         if hand.tool and plan.state.tool != hand.tool:
             plan.plan_context.arm.chain_to(hand.tool)
             plan = plan.with_action(
@@ -186,8 +186,8 @@ class Grasp(Step, word="grasp", example="cup"):
 
     def _grips(self, plan: PlanState, scene_object: SceneObject, approach: Approach) -> list[Grip]:
         """Return the places of the grasp on the object, the best first."""
-        if self.height is not None:
-            return [Grip(self.height)]
+        if self.height is not None or plan.hand.is_cup:
+            return [Grip(scene_object.height if self.height is None else self.height)]
         fractions = HEIGHT_FRACTIONS[ABOVE if approach.pitch == DOWN else FRONT]
         grips = [Grip(fraction * scene_object.height) for fraction in fractions]
         if scene_object.height < LOW:
@@ -295,6 +295,8 @@ def _why_not_held(state: State) -> str:
         return f"they would close on {state.held.name}"
     if any(finding.reason is Reason.LOPSIDED for finding in state.findings):
         return "only one of them would touch it"
+    if any(finding.reason is Reason.LEAKING for finding in state.findings):
+        return "the suction cup would leak, because it needs a flat face as wide as its rim"
     return "they close without touching it"
 
 
