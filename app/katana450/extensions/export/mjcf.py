@@ -155,7 +155,8 @@ def drives_of(robot: Robot, grip: HandDrive | None) -> dict[str, Drive]:
         force = joint.effort if is_credible else FORCE_RATIO * load
         armature, ratio = INERTIA_RATIO * inertia, DAMPING_RATIO
         if grip is not None and joint.leader in grip.joints:
-            stiffness, force = max(stiffness, grip.stiffness), grip.force
+            # With more stiffness, and its damping, this force would move it too slowly.
+            stiffness, force = grip.stiffness, grip.force
             # A light finger would be pressed into what it holds.
             armature = physics.FINGER_MASS if joint.slides else physics.FINGER_INERTIA
             # In the joints, because a drive at its greatest force has no damping of its own.
