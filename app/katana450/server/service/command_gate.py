@@ -216,18 +216,24 @@ class CommandGate:
             self.recorder.lease("acquired", before, lease, actor)
 
     def change(
-        self, event: Callable[[Lease, float], Lease], by: Actor = SERVER, act: str = ""
+        self,
+        event: Callable[[Lease, float], Lease],
+        by: Actor = SERVER,
+        act: str = "",
+        *,
+        holds: bool = True,
     ) -> None:
         """Apply ``event`` to the lease at the present time. A change of holder holds the arm.
 
         ``by``: actor in whose name the arm holds. ``act``: word for ``event`` in the event log;
-        empty for what is not recorded. Raises the LeaseError of ``event``.
+        empty for what is not recorded. ``holds``: False to let the arm finish its motion. Raises
+        the LeaseError of ``event``.
         """
         with self.lock:
             lease = event(self.lease, self._clock())
             if lease.holder != self.lease.holder:
                 self._revoke()
-                if self.arm is not None:
+                if self.arm is not None and holds:
                     # InputError: the mailbox is full, or the arm's process does not answer.
                     with suppress(InputError):
                         grounds = Grounds.SERVER if by is SERVER else Grounds.LEASE
@@ -470,7 +476,7 @@ def _moves_by_hand(command: cmd.Command, actor: Actor) -> bool:
         return False
     if isinstance(command, cmd.EndDrag) or (isinstance(command, cmd.Jog) and not command.sample):
         return False
-    return any(part.traits.goal for part in command.parts)
+    return isinstance(command, cmd.RestoreState) or any(part.traits.goal for part in command.parts)
 
 
 def guarded(note: Callable[[], None]) -> Callable[[], None]:

@@ -275,11 +275,16 @@ class Hub:
         person = participant.person
         self.gate.change(lambda lease, _: lease.release(person), participant.actor, "released")
 
-    def hand_over(self, participant: Participant, number: int) -> None:
-        """Hand the lease to the participant of ``number``; a running program of the giver ends."""
+    def hand_over(self, participant: Participant, number: int, *, holds: bool = True) -> None:
+        """Hand the lease to the participant of ``number``; a running program of the giver ends.
+
+        ``holds``: whether the arm stops, see ``CommandGate.change``.
+        """
         giver, taker = self.giver(participant), self._numbered(number).person
         actor = participant.actor
-        self.gate.change(lambda lease, t: lease.hand_over(giver, taker, t), actor, "handed over")
+        self.gate.change(
+            lambda lease, t: lease.hand_over(giver, taker, t), actor, "handed over", holds=holds
+        )
 
     def decline(self, participant: Participant, number: int) -> None:
         """Decline the request of the participant of ``number`` for the lease, and notify it."""

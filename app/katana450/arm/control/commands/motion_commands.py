@@ -126,12 +126,19 @@ class Follow(Command, frozen=True, eq=False):
             raise InputError(f"`tau` must be from 0 to below {self.plan.span:g}, not {self.tau!r}.")
 
 
+LAST_MINUTES = "ring"
+"""Name of the recording of the present run."""
+
+OWN_RUN = ("", LAST_MINUTES)
+"""Recordings that a state of the present run is restored from."""
+
+
 class RestoreState(Command, frozen=True, eq=False):
     """Continue from ``state``, one of an earlier run of the same robot, at the present time.
 
     Attributes:
         state: the state, with the time of its own run.
-        recording: name of the recording that has it; empty if none has.
+        recording: name of the recording that has it, such as LAST_MINUTES; empty if none has.
     """
 
     traits: ClassVar[Traits] = Traits(joints_only=True)
@@ -142,6 +149,11 @@ class RestoreState(Command, frozen=True, eq=False):
     def __post_init__(self) -> None:
         if not isinstance(self.state, State):
             raise InputError(f"`state` must be a State, not {self.state!r}.")
+
+    @property
+    def of_own_run(self) -> bool:
+        """True if the state is one of the present run of the server."""
+        return self.recording in OWN_RUN
 
 
 class Batch(Command, frozen=True, eq=False):

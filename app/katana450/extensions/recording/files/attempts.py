@@ -9,15 +9,13 @@ from itertools import zip_longest
 import msgspec
 from msgspec.structs import replace
 
+from katana450.arm.control.commands.motion_commands import OWN_RUN
 from katana450.arm.control.lease import CommandChannel
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.spans import Span
 from katana450.extensions.recording.files.table import TICK
 from katana450.extensions.recording.messages import EVENTS
 from katana450.server.api.episode_requests import Judgement
-
-OWN_RUN = ("", "ring")
-"""Recordings that a state of the same run is restored from."""
 
 RESTORE, DRIVER, ATTEMPT = "restore", "driver", "attempt"
 """Kinds of the events that make the tree: a continuation, a change of driver, a description."""

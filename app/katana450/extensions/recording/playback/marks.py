@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from katana450.arm.control.commands.motion_commands import OWN_RUN
 from katana450.arm.control.lease import CommandChannel
 from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import Finding, Reason
@@ -105,7 +106,7 @@ def _restored(form: Mapping[str, Any]) -> str:
     t, since = form.get("t"), form.get("since")
     if not (isinstance(t, int | float) and isinstance(since, int | float)):
         return "Continues from another moment"
-    if form.get("recording") not in attempts.OWN_RUN:
+    if form.get("recording") not in OWN_RUN:
         return f"Continues from {since:.1f} s of a file"
     return f"Continues from {_duration(t - since)} earlier"
 
