@@ -212,6 +212,19 @@ def test_owner_takes_over_by_moving_the_arm(table: Staged, move: cmd.Command) ->
     assert table.arm.holds == holds + 2
 
 
+def test_owner_sets_the_arm_back_while_the_program_runs(table: Staged) -> None:
+    owner, session = table.join(PAGES[0]), table.arm.session
+    table.run(owner)
+    table.wait(0.1, owner)
+    table.hub.move(owner, cmd.RestoreState(session.begin(session.ready, 0.0, 0.0), "ring"))
+    table.wait(0.1, owner)
+    assert table.hub.lease.holder == owner.person
+    assert table.bar(owner)["why"].startswith("The arm continues from an earlier moment at step 1")
+    assert table.programs.orders(owner) == ("continue",)
+    table.programs.steer(owner, ProgramOrder.CONTINUE)
+    assert table.status == "running"
+
+
 def test_handle_is_grabbed_before_its_first_command_takes_over(table: Staged) -> None:
     owner = table.join(PAGES[0])
     table.run(owner)

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from katana450.arm.control.state.state import State
 from katana450.client import Client, RefusedError
+from katana450.extensions.recording.playback.store import RecordingStore
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Breakpoints, Preview, Program, ProgramOrder, Steer
 from tests.gateway.client import Control
@@ -150,6 +152,40 @@ def test_stopped_program_is_continued_after_the_stop_is_cleared(ready: Client) -
     assert posture(ready) == pytest.approx(END, abs=1e-9)
     with pytest.raises(RefusedError, match="No program was interrupted"):
         ready.ask(Steer(order=ProgramOrder.CONTINUE))
+
+
+@pytest.mark.parametrize("rests", [False, True], ids=["in its motion", "after its motion"])
+def test_program_continues_from_a_moment_in_which_it_ran(
+    local: VirtualServer, ready: Client, monkeypatch: pytest.MonkeyPatch, rests: bool
+) -> None:
+    ready.ask(Steer(order=ProgramOrder.RUN))
+    wait(ready, lambda status: status.step == 2 and status.fraction > 0.3)
+    moment = local.hub.present().state
+
+    async def state_at(*_: object) -> State:
+        return moment
+
+    monkeypatch.setattr(RecordingStore, "state_at", state_at)
+    assert wait(ready, lambda status: status.status == "done").can_continue is False
+    ready.fork(1.0)
+    assert moment.following is not None
+    before = wait(ready, lambda status: status.can_continue)
+    assert (before.status, before.step) == ("stopped", 2)
+    if rests:
+        local.sleep(3.0)
+        assert not local.hub.present().state.moving
+    ready.ask(Steer(order=ProgramOrder.CONTINUE))
+    steps = []
+    # The same plan is followed: nothing is planned, and the arm does not brake.
+    while (now := ready.query(answers.State).program) is not None and now.status == "running":
+        assert local.hub.present().state.following is not None
+        steps.append(now.step)
+        time.sleep(0.02)
+    assert now is not None
+    assert (now.status, set(steps) | {2}) == ("done", {2, 3})
+    # One look at the arm is enough to find the end of the motion.
+    assert (steps.count(2) < 4) == rests
+    assert posture(ready) == pytest.approx(END, abs=1e-9)
 
 
 def test_continuation_is_refused_after_the_gripper_has_moved(ready: Client) -> None:

@@ -69,9 +69,21 @@ class FollowPlan(Action):
 
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
         """Return the completed fraction of the plan; 0 until the arm follows it."""
-        following = state.following
-        # The plan of the step before is followed until the command arrives.
-        return following.fraction if following is not None and following.plan is self.plan else 0.0
+        following = self.followed(state)
+        return 0.0 if following is None else following.fraction
+
+    def followed(self, state: State) -> Following | None:
+        """Return the place on the plan; None while ``state`` follows another one or none.
+
+        The plan of the step before is followed until the command arrives. A state that was restored
+        has a copy of its plan.
+        """
+        following, plan = state.following, self.plan
+        if following is None or following.plan is plan:
+            return following
+        other = following.plan
+        same = other.span == plan.span and np.array_equal(other.end, plan.end)
+        return following if same else None
 
 
 @dataclass(frozen=True)

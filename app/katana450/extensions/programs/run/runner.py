@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import chain
@@ -120,10 +121,37 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
 
 def _tau(program: Program, run: Run, state: State) -> float:
     """Return the place [s] on the plan of the current task; the last one if it was left."""
-    action, following = program.tasks[run.number].action, state.following
-    if not run.started or following is None or not isinstance(action, FollowPlan):
-        return run.tau
-    return following.tau if following.plan is action.plan else run.tau
+    action = program.tasks[run.number].action
+    following = action.followed(state) if isinstance(action, FollowPlan) and run.started else None
+    return run.tau if following is None else following.tau
+
+
+def follows(program: Program, run: Run, state: State) -> bool:
+    """Return whether the arm is on the plan of the current task, if that has begun one."""
+    action = program.tasks[run.number].action
+    left = run.started and isinstance(action, FollowPlan) and action.followed(state) is None
+    return not left
+
+
+EFFECT_TIME = 0.1
+"""[s] Time after which a command of the program has an effect on the states."""
+
+
+def reached(program: Program, runs: Iterable[tuple[float, Run]], state: State) -> Run | None:
+    """Return the run in which ``state`` was reached; None before the first of ``runs``.
+
+    ``runs`` are those with a new task, or with its commands given, with the times of their states
+    [s]. A command that ``state`` does not show yet is given again.
+    """
+    earlier = [(t, run) for t, run in runs if t <= state.t]
+    if not earlier or earlier[-1][1].phase is not Phase.RUNNING:
+        return None
+    t, run = earlier[-1]
+    action, since = program.tasks[run.number].action, state.t - t
+    shown = isinstance(action, FollowPlan) or since > EFFECT_TIME
+    started = run.started and shown and follows(program, run, state)
+    run = replace(run, started=started, waited=since if started else 0.0, blocked=0.0)
+    return replace(run, tau=_tau(program, run, state), single=False)
 
 
 def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0) -> float:

@@ -128,12 +128,14 @@ class ProgramParticipant:
         name: str,
         owner: Participant,
         follow_run: Callable[[float, float | None], None],
+        *,
+        holds: bool = True,
     ) -> None:
         """Join ``hub`` as the program ``name`` of ``owner``, and take the lease.
 
         ``follow_run`` is called with the time at which the run begins [s] and None, and at its end
-        with both times. Raises LeaseError if another participant holds the lease, or the arm is
-        stopped.
+        with both times. ``holds``: whether the arm stops first. Raises LeaseError if another
+        participant holds the lease, or the arm is stopped.
         """
         self._hub, self._owner = hub, owner
         identity, alive = program_identity(name, owner.person), AlwaysAlive(hub.clock)
@@ -141,11 +143,12 @@ class ProgramParticipant:
         try:
             if hub.lease.holder == owner.person:
                 # A handover in one step: no other participant can take the lease in between.
-                hub.hand_over(owner, joined.number)
+                hub.hand_over(owner, joined.number, holds=holds)
             else:
                 hub.gate.acquire(joined.actor)
             # Drops earlier targets; a pause lasts. Raises LeaseError if the arm is stopped.
-            self.ticket = hub.move(joined, cmd.Hold())
+            hub.gate.check_not_stopped()
+            self.ticket = hub.move(joined, cmd.Hold()) if holds else None
         except LeaseError:
             hub.leave(joined, for_good=True)
             raise

@@ -16,13 +16,14 @@ import msgspec
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Request
-from katana450.arm.control.lease import Person
+from katana450.arm.control.lease import Actor, Person
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.continuation import Interruption
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.run.situation import Situation
 from katana450.extensions.programs.server import page_state
 from katana450.extensions.programs.server.page_state import (
     RunNews,
@@ -51,6 +52,9 @@ from katana450.server.service.runner import Runner, StatusLine
 
 log = logging.getLogger(__name__)
 
+MAX_TASKS = 1000
+"""Number of tasks of a run after which the arm can be set back."""
+
 
 class ProgramRunner(Runner):
     """The runner of at most one program at a time."""
@@ -67,6 +71,11 @@ class ProgramRunner(Runner):
         self._reached: State | None = None
         self._taken_over: State | None = None
         self._left_tool: LeftTool | None = None
+        # Runs of the present program whose task is new or begins, by the times of their states.
+        self._tasks: list[tuple[float, Run]] = []
+        # The run at a moment that the arm was set back to, and the number of motions until then.
+        self._restored: tuple[Run, int] | None = None
+        hub.gate.delivered.append(self._note_restored)
         self._is_news = False  # Whether no other command followed the end of a run or planning.
         self._runs_as: ProgramParticipant | None = None
         self._run: Run | None = None
@@ -137,7 +146,8 @@ class ProgramRunner(Runner):
         if self.planner.script(participant, text, more=more, speed=speed):
             self._run, self._is_news = None, True
             if self.planner.text != before:
-                self._interruption = self._taken_over = None
+                self._interruption = self._taken_over = self._restored = None
+                self._tasks = []
 
     def set_breakpoints(self, participant: Participant, steps: Sequence[int]) -> None:
         """Make the present program pause before ``steps``, from 1. Raises LeaseError."""
@@ -229,10 +239,7 @@ class ProgramRunner(Runner):
         if self._runs_as is None or self._run is None or program is None:
             return
         if not self._runs_as.drives:
-            reason = "The lease was taken from the program."
-            if (holder := hub.lease.holder) is not None and self._owner.is_person(holder):
-                reason, self._taken_over = f"{holder.name} took over.", self._reached
-            self._leave_with(runner.ended(self._run, Phase.STOPPED, reason))
+            self._leave_with(self._left_run(self._run))
             return
         owner = self._owner.participant
         if (why := hub.halted) is not None:
@@ -251,6 +258,8 @@ class ProgramRunner(Runner):
                 self._runs_as.send(*commands)
             except InputError as error:
                 run = runner.ended(run, Phase.FAILED, str(error))
+            if (run.number, run.started) != (self._run.number, self._run.started):
+                self._note_task(run)
             if run.phase is Phase.RUNNING:
                 self._run = run
             else:
@@ -351,6 +360,14 @@ class ProgramRunner(Runner):
     def _plan_part(self, participant: Participant, order: ProgramOrder, step: int | None) -> None:
         """Plan the program from a step, or from where it ended early, and then run it."""
         planning, interruption = self.planner.planning, self._interruption
+        if step is None and self._restored is not None and planning is not None:
+            run, motions = self._restored
+            assert planning.program is not None
+            untouched = motions == self.hub.gate.motions
+            if untouched and runner.follows(planning.program, run, self.hub.present().state):
+                self._owner.check_may_steer(participant.person)
+                self._start(planning, participant, order, run)
+                return
         if planning is None:
             raise LeaseError("No program is planned. Send a script first.")
         if self.running and step is None:
@@ -371,6 +388,36 @@ class ProgramRunner(Runner):
                 participant, planning.text, planning.speed, first_step=(step or 1) - 1
             )
         self._run, self.planner.then = None, order
+
+    def _left_run(self, run: Run) -> Run:
+        """Return ``run`` after the lease was taken from it; or that which the arm was set back to.
+
+        If its owner has taken over, its state is kept for ``_rewind``.
+        """
+        if self._restored is not None:
+            return self._restored[0]
+        reason, holder = "The lease was taken from the program.", self.hub.lease.holder
+        if holder is not None and self._owner.is_person(holder):
+            reason, self._taken_over = f"{holder.name} took over.", self._reached
+        return runner.ended(run, Phase.STOPPED, reason)
+
+    def _note_task(self, run: Run) -> None:
+        """Remember that ``run`` has a new task, begins it or ends."""
+        self._tasks = [*self._tasks[1 - MAX_TASKS :], (self.hub.present().state.t, run)]
+
+    def _note_restored(self, command: cmd.Command, _actor: Actor, *_: object) -> None:
+        """Offer to continue the program after the arm was set back to a moment in which it ran."""
+        program = self.program
+        if not isinstance(command, cmd.RestoreState) or program is None or self._run is None:
+            return
+        self._restored = None
+        run = runner.reached(program, self._tasks, command.state)
+        if run is not None and command.of_own_run:
+            ended = runner.ended(run, Phase.STOPPED, "The arm continues from an earlier moment.")
+            self._restored = ended, self.hub.gate.motions
+            self._interruption = Interruption(program, ended, Situation.of(command.state))
+            if not self.running:
+                self._run, self._is_news = ended, True
 
     def _rewind(self, participant: Participant) -> int:
         """Restore the state in which the owner took over, and hold the arm there."""
@@ -393,26 +440,36 @@ class ProgramRunner(Runner):
         return self._start(planning, participant, order)
 
     def _start(
-        self, planning: Planning, participant: Participant, order: ProgramOrder
+        self,
+        planning: Planning,
+        participant: Participant,
+        order: ProgramOrder,
+        reached: Run | None = None,
     ) -> int | None:
-        """Run the program of ``planning``, which fits the present situation."""
+        """Run the program of ``planning``, which fits the present situation.
+
+        ``reached``: the run in which the arm is, on the plan of its task; None for its beginning.
+        """
         assert planning.program is not None
         planning.refused, planning.note = None, ""
         program, began = planning.program, self.hub.clock()
         follow = partial(self.follow_run, program.name, planning.text)
-        self._runs_as = ProgramParticipant(self.hub, program.name, participant, follow)
+        self._runs_as = ProgramParticipant(
+            self.hub, program.name, participant, follow, holds=reached is None
+        )
         self._owner.change_to(participant, began)
-        self._interruption = self._left_tool = self._taken_over = None
+        self._interruption = self._left_tool = self._taken_over = self._restored = None
+        begin = replace(planning.continues or Run(began), number=program.first, started=False)
         self._run = replace(
-            planning.continues or Run(began),
+            begin if reached is None else reached,
             t=began,
-            number=program.first,
-            started=False,
             phase=Phase.RUNNING,
             why="",
             single=order is ProgramOrder.STEP,
             pauses=self.planner.breakpoints,
         )
+        self._tasks = [] if reached is None else self._tasks
+        self._note_task(self._run)
         log.info("%s runs the program %s.", participant.person.name, program.name)
         what = {"program": program.name, "order": order.value}
         self.hub.recorder.note("program", participant.actor, what)
@@ -432,9 +489,10 @@ class ProgramRunner(Runner):
     def _leave_with(self, run: Run) -> None:
         """End with ``run`` and release the lease; the arm is at rest or comes to rest."""
         assert self._runs_as is not None
-        if self.program is not None:
+        if self.program is not None and self._restored is None:
             # Set first, because the progress is read in other threads too.
             self._interruption = Interruption.of(self.program, run, self.hub.present().state)
+        self._note_task(run)
         left, self._runs_as, self._run = self._runs_as, None, run
         self._left_tool, self._is_news = left.leave(), True
         actor = left.joined.actor
