@@ -227,7 +227,7 @@ class Grounds(Enum):
 
     LEASE = "holds the lease"
     FREE_LEASE = "took the free lease"
-    PROGRAM_OWNER = "owns the program that holds the lease"
+    PROGRAM_OWNER = "owns the program that holds the lease, or may take it from that client"
     SAFETY = "anybody may stop the arm"
     NO_DRIVER = "may clear a stop while nobody drives"
     PRESSER = "pressed STOP, or is an admin"

@@ -74,6 +74,22 @@ class RunningProgram(NamedTuple):
     owner: str
 
 
+class Takeover(NamedTuple):
+    """The arm was taken from a client of the API, such as a policy, by moving it.
+
+    Attributes:
+        client: the client, which may be given the arm back.
+        by: key of the person who moved it.
+        state: the state before.
+        since: time since which the client had driven [s since the epoch].
+    """
+
+    client: Person
+    by: str
+    state: State
+    since: float
+
+
 class CommandGate:
     """Gate that accepts or refuses each command. Every method may be called in any thread.
 
@@ -97,6 +113,11 @@ class CommandGate:
         """The running program; None without one."""
         self.ended: RunningProgram | None = None
         """The program that was interrupted last, until a participant gets the lease."""
+        self.takeover: Takeover | None = None
+        """The newest takeover from a client, while the person who took over drives."""
+        self.is_client: Callable[[Person], bool] = lambda _: False
+        """Function that returns whether a person is a connected client of the API."""
+        self._held_since = 0.0
         self.revocations = self.motions = 0
         """Number of stops and losses of the lease; of commands that superseded a motion."""
         self.on_stop: Callable[[], None] = lambda: None
@@ -162,12 +183,15 @@ class CommandGate:
 
         A gesture without a command, such as grabbing a handle, uses this. Raises, and acquires a
         free lease, as ``submit`` does. ``of_arm``: whether the gesture is at a control of the arm,
-        whose first command takes over from the program of ``actor``.
+        whose first command takes over from the program of ``actor``, or from a client.
         """
         with self.lock:
             try:
                 self.check_runs()
                 self._check_settled(actor)
+                if of_arm and self._suspends(actor):
+                    self.check_current(actor)
+                    return replace(actor, grounds=Grounds.PROGRAM_OWNER)
                 return self._granted(actor, pacing=of_arm)
             except LeaseError as error:
                 self.recorder.refuse("gesture", actor, error)
@@ -211,7 +235,7 @@ class CommandGate:
             if before.holder is not None:
                 # That holder has closed its window.
                 self._revoke()
-            self.lease = lease
+            self._hold_lease(lease)
             self.ended = None
             self.recorder.lease("acquired", before, lease, actor)
 
@@ -240,7 +264,7 @@ class CommandGate:
                         self.arm.deliver(cmd.Hold(), replace(by, grounds=grounds))
             if act and lease is not self.lease:
                 self.recorder.lease(act, self.lease, lease, by)
-            self.lease = lease
+            self._hold_lease(lease)
             self.ended = self.ended if lease.holder is None else None
 
     # Stop
@@ -435,21 +459,45 @@ class CommandGate:
         self.revocations += 1
         self._jogged = -cmd.JOG_TIME
 
+    def _hold_lease(self, lease: Lease) -> None:
+        """Set the lease, and note a new holder."""
+        if lease.holder != self.lease.holder:
+            self.takeover, self._held_since = None, time.time()
+        self.lease = lease
+
+    def takeover_by(self, person: Person) -> Takeover | None:
+        """Return the takeover by ``person``, who still drives; None without one."""
+        takeover = self.takeover
+        return takeover if takeover is not None and takeover.by == person.key else None
+
+    def _suspends(self, actor: Actor) -> bool:
+        """Return whether ``actor`` takes over by moving the arm that a client of the API drives.
+
+        An admin does so, and a person with the access link of the client.
+        """
+        client, person = self.lease.driver, actor.person
+        if client is None or client == person or not self.is_client(client):
+            return False
+        return person.role.may_take or (client.link != "" and client.link == person.link)
+
     def _take_over(self, command: cmd.Command, actor: Actor) -> None:
-        """Give ``actor`` the lease of the program that it owns, which ends at its next step.
+        """Give ``actor`` the lease of its program, which ends, or of a client, which waits.
 
         No gesture becomes void, because nobody else could drive meanwhile. Raises InputError if the
         arm cannot accept ``command``; the program continues then.
         """
-        before, program = self.lease, self.program
-        if program is None or program != (before.holder, actor.key):
+        before, holder, since = self.lease, self.lease.holder, self._held_since
+        suspends = self._suspends(actor)
+        if holder is None or not (suspends or self.program == (holder, actor.key)):
             return
         self.check_current(actor)
         arm = self.present()
         arm.session.check(command)
         # The path of the program is left in any case, also where its state forbids the command.
         arm.deliver(cmd.Hold(), replace(actor, grounds=Grounds.PROGRAM_OWNER))
-        self.lease = before.hand_over(program.person, actor.person, self._clock())
+        self._hold_lease(before.hand_over(holder, actor.person, self._clock()))
+        if suspends:
+            self.takeover = Takeover(holder, actor.key, arm.state, since)
         self.recorder.lease("taken over", before, self.lease, actor)
 
     def _granted(self, actor: Actor, *, pacing: bool) -> Actor:

@@ -47,6 +47,9 @@ log = logging.getLogger(__name__)
 TICK = 0.02
 """Interval of the checks for silence [s]."""
 
+CLIENTS = (CommandChannel.WEBSOCKET, CommandChannel.TCP, CommandChannel.HTTP)
+"""Channels of clients of the API, such as policies."""
+
 
 class StopNews:
     """Calls listeners when a stop begins, is confirmed for the first time, or is cleared.
@@ -86,6 +89,7 @@ class Hub:
         self._hold_after = hold_after
         self.gate = CommandGate(clock)
         self.gate.presser_of = self._presser_of
+        self.gate.is_client = self._is_client
         self.stop_path, self.stop_news = StopPath(), StopNews()
         self._followed: State | None = None
         self.requires_link = False
@@ -286,6 +290,11 @@ class Hub:
             lambda lease, t: lease.hand_over(giver, taker, t), actor, "handed over", holds=holds
         )
 
+    def give_back(self, participant: Participant, client: Person) -> None:
+        """Hand the lease of ``participant`` to ``client``. Raises LeaseError if it has left."""
+        taker = self._participants.get(client.key)
+        self.hand_over(participant, 0 if taker is None else taker.number)
+
     def decline(self, participant: Participant, number: int) -> None:
         """Decline the request of the participant of ``number`` for the lease, and notify it."""
         giver, requester = self.giver(participant), self._numbered(number)
@@ -389,6 +398,11 @@ class Hub:
         """Return the person at ``page``, whether or not its control socket is open now."""
         key = key_of(identity, page)
         return self._known.recognise(key, identity, self._participants)[0]
+
+    def _is_client(self, person: Person) -> bool:
+        """Return whether ``person`` is a connected client of the API. For any thread."""
+        participant = self._participants.get(person.key)
+        return participant is not None and participant.channel in CLIENTS
 
     def _presser_of(self, cause: StopCause) -> Actor | None:
         """Return the participant that pressed STOP on the port of STOP; None for a watchdog."""

@@ -159,6 +159,21 @@ def common(hub: Hub) -> dict[str, Any]:
     }
 
 
+def taken_over(hub: Hub, person: Person) -> dict[str, Any]:
+    """Return the entries on a takeover by ``person`` from a client; none without one."""
+    takeover = hub.gate.takeover_by(person)
+    if takeover is None or hub.stopped is not None:
+        return {}
+    is_there = hub.participant(takeover.client.key) is not None
+    orders = ["continue"] if is_there else []
+    rewinds = ["rewind"] if hub.arm is not None and hub.arm.state.report is None else []
+    return {
+        "orders": [*orders, *rewinds, *(["keep"] if hub.shown.get("episodes") else [])],
+        "continues": [takeover.client.name, 0, 0],
+        "driven_since": takeover.since,
+    }
+
+
 def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     """Return the part of the status that is for ``participant`` alone."""
     person, lease = participant.person, hub.lease
@@ -200,6 +215,7 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
         "fraction": round(program.fraction, 2) if program is not None and planning else 0.0,
         "orders": list(hub.runner.orders(participant)) if hub.arm is not None else [],
         "continues": [program.name, program.step, program.steps] if program is not None else [],
+        **taken_over(hub, person),
         "age": round(age, 1) if age >= MIN_SHOWN_AGE else 0,
         **{
             key: value

@@ -360,6 +360,10 @@ class ProgramRunner(Runner):
     def _plan_part(self, participant: Participant, order: ProgramOrder, step: int | None) -> None:
         """Plan the program from a step, or from where it ended early, and then run it."""
         planning, interruption = self.planner.planning, self._interruption
+        if step is None and (takeover := self.hub.gate.takeover_by(participant.person)):
+            self.hub.gate.check_not_stopped()
+            self.hub.give_back(participant, takeover.client)
+            return
         if step is None and self._restored is not None and planning is not None:
             run, motions = self._restored
             assert planning.program is not None
@@ -421,10 +425,13 @@ class ProgramRunner(Runner):
 
     def _rewind(self, participant: Participant) -> int:
         """Restore the state in which the owner took over, and hold the arm there."""
-        self._owner.check_may_steer(participant.person)
-        if self._taken_over is None or self.running:
+        takeover = self.hub.gate.takeover_by(participant.person)
+        state = self._taken_over if takeover is None else takeover.state
+        if takeover is None:
+            self._owner.check_may_steer(participant.person)
+        if state is None or self.running:
             raise LeaseError("Nobody has taken over from this program.")
-        self.hub.move(participant, cmd.RestoreState(self._taken_over))
+        self.hub.move(participant, cmd.RestoreState(state))
         return self.hub.move(participant, cmd.Hold())
 
     def _begin(self, participant: Participant, order: ProgramOrder) -> int | None:
