@@ -25,7 +25,7 @@ class Bench:
     """A follower with a server and a leader of which the test is in charge."""
 
     def __init__(self) -> None:
-        self.follower = Follower(FINGERS)
+        self.follower = Follower(FINGERS, "Leader")
         self.t = 100.0
         self.angle, self.finger = 0.3, 0.5
         self.answers = True
@@ -35,6 +35,7 @@ class Bench:
             "setpoint": [0.0] * N,
             "stopped": None,
             "revocations": 4,
+            "holder": "Leader",
             "program": None,
             "status": "ok",
             "gripper": 0.5,
@@ -76,6 +77,7 @@ class ServerState(msgspec.Struct):
     setpoint: list[float]
     stopped: str | None
     revocations: int
+    holder: str | None
     program: answers.Progress | None
     status: str
     gripper: float

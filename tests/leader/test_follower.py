@@ -67,6 +67,16 @@ def test_leader_that_moved_meanwhile_is_approached_on_another_plan_once_it_rests
     assert bench.follower.phase is LeadPhase.EASING
 
 
+def test_arm_that_a_person_gives_back_eases_to_the_leader_again() -> None:
+    bench = Bench()
+    bench.follow()
+    bench.values["holder"] = "Ada"
+    assert "changed its driver" in texts(bench.step())
+    assert not any(isinstance(action, Ease | Sample) for action in bench.step(60))
+    bench.values |= {"holder": "Leader", "revocations": 7}
+    assert [action.revocations for action in bench.step(5) if isinstance(action, Ease)] == [7]
+
+
 ENDS: dict[str, dict[str, Any]] = {
     "sent no valid posture": {"answers": False},
     "server does not answer": {"server_answers": False},

@@ -21,6 +21,8 @@ from tests.leader.test_joint_map import WiredPort, arm, calibrated
 class StalledServer:
     """A client whose server sends states, and never answers a program."""
 
+    welcome = answers.Welcome(name="Leader", number=1, role="operator", heartbeat=0.1)
+
     def __init__(self) -> None:
         self.asked: list[requests.Request] = []
         self.state = msgspec.convert(Bench().values, ServerState)

@@ -188,8 +188,14 @@ class Follower:
         history: the newest postures of the leader.
     """
 
-    def __init__(self, finger_range: tuple[float, float] | None) -> None:
-        """Wait. ``finger_range``: finger joint closed and open; None without fingers."""
+    def __init__(self, finger_range: tuple[float, float] | None, name: str = "") -> None:
+        """Wait.
+
+        Args:
+            finger_range: finger joint closed and open; None without fingers.
+            name: name of this client, as states give it.
+        """
+        self._name = name
         self.phase = LeadPhase.WAITING
         self.history = PostureHistory()
         self._range = finger_range
@@ -197,6 +203,8 @@ class Follower:
         self._revocations = 0
         self._first = True
         self._holds = False
+        # Whether a state has shown that it drives, and whether a person has taken the arm then.
+        self._drove = self._suspended = False
         self._finger: tuple[float, float] | None = None
 
     def step(
@@ -222,6 +230,8 @@ class Follower:
         accepted = posture is not None and self.history.add(t, posture)
         match self.phase:
             case LeadPhase.WAITING:
+                # A person who gives the arm back asks for it as one who presses Enter does.
+                confirmed |= self._suspended and state.holder == self._name
                 return self._begun(t, state) if confirmed else self._released(t, state, heard)
             case _ if confirmed:
                 return self.rest("You have ended it.")
@@ -250,6 +260,7 @@ class Follower:
         return Say(f"{why} The arm rests.")
 
     def _begun(self, t: float, state: answers.State) -> list[Action]:
+        self._drove = self._suspended = False
         if not self.history.fresh(t):
             return self.rest("The leader does not answer.")
         if state.stopped is not None:
@@ -280,7 +291,9 @@ class Follower:
         if self.phase is LeadPhase.EASING:
             # The program has a lease of its own, which counts as a revocation when it ends.
             return []
-        if state.revocations != self._revocations:
+        taken = self._drove and state.holder not in (None, self._name)
+        if taken or state.revocations != self._revocations:
+            self._suspended = taken
             return self.rest("The arm was stopped or changed its driver.")
         if state.status == "paused":
             return self.rest("The arm was paused.")
@@ -315,6 +328,7 @@ class Follower:
         newest = self.history.newest
         sample = Sample(newest.q, self.history.rates(), self._revocations, self._first)
         self._first, self._holds = False, True
+        self._drove |= state.holder == self._name
         grip = self._gripped(t, newest.finger, state.gripper)
         return [sample] if grip is None else [sample, grip]
 

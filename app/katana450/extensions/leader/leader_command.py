@@ -130,7 +130,7 @@ class LeaderRun:
         self._bus = bus
         self._joints = joints
         self._keyboard = keyboard
-        self._follower = Follower(joints.finger_range)
+        self._follower = Follower(joints.finger_range, client.welcome.name)
         self._state: tuple[answers.State, float] | None = None
         self._easing: asyncio.Task[None] | None = None
 
