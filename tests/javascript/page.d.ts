@@ -37,7 +37,7 @@ declare namespace Page {
     speed: number; paused: boolean; arm: ArmStatus | null; participants: number; revocations: number; scripts: boolean;
     pace: string; may_clear_stop: boolean; until: string; name: string; role: string; mine: boolean;
     own_program: boolean; asked: boolean; asking: Named[]; others: Named[]; planning: boolean;
-    fraction: number; orders: Api.ProgramOrder[]; continues: [] | [string, number, number]; age: number;
+    fraction: number; orders: (Api.ProgramOrder | "keep")[]; driven_since?: number; continues: [] | [string, number, number]; age: number;
     /** Names of what can be undone and redone, the newest first. */
     undo?: string[]; redo?: string[];
     clearance: Clearance | null;
