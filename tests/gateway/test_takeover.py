@@ -96,12 +96,12 @@ def test_takeover_is_rewound_stopped_and_refused_to_others(drive: Drive) -> None
     hub.gate.claim(hub.at_scene(ada.person.key, hub.gate.revocations), of_arm=True)
     assert hub.lease.holder != ada.person
     hub.move(ada, cmd.Joint(1, -0.4))
-    taken: State = hub.gate.takeover.state if hub.gate.takeover else drive.last
+    before: State = hub.gate.takeover.state if hub.gate.takeover else drive.last
     drive.wait(1.0, ada, streams=False)
     assert status.of(hub, ada)["continues"] == ["Test", 0, 0]
     drive.runner.steer(ada, ProgramOrder.REWIND)
     drive.server.sleep(0.05)
-    np.testing.assert_allclose(hub.present().state.setpoint, taken.setpoint, atol=0.05)
+    np.testing.assert_allclose(hub.present().state.setpoint, before.setpoint, atol=0.05)
     drive.policy.stop()
     assert orders(drive, ada) == []
     with pytest.raises(LeaseError, match="stopped"):

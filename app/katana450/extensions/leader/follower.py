@@ -291,9 +291,9 @@ class Follower:
         if self.phase is LeadPhase.EASING:
             # The program has a lease of its own, which counts as a revocation when it ends.
             return []
-        taken = self._drove and state.holder not in (None, self._name)
-        if taken or state.revocations != self._revocations:
-            self._suspended = taken
+        other_drives = self._drove and state.holder not in (None, self._name)
+        if other_drives or state.revocations != self._revocations:
+            self._suspended = other_drives
             return self.rest("The arm was stopped or changed its driver.")
         if state.status == "paused":
             return self.rest("The arm was paused.")
