@@ -38,9 +38,25 @@ LARGEST_ZIP = 1_200_000
 """[bytes]"""
 
 
-def unpacked(where: Path, urdf: Path = URDF_PATH) -> Path:
+SCENE = """
+scene: 1
+objects:
+- name: door
+  shape: box
+  size: [200, 12, 150]
+  pose: [450, 200, 5, 0, 0, 0]
+  joint: {type: hinge, axis: z, origin: [-100, 0, 0], range: [0, 90], position: 30, friction: 0.05}
+- {name: knob, shape: box, size: [12, 40, 60], pose: [530, 174, 40, 0, 0, 0], part_of: door}
+- {name: post, shape: box, size: [20, 20, 100], pose: [360, 200, 0, 0, 0, 0]}
+- {name: cube, shape: box, size: [40, 40, 40], pose: [400, -100, 0, 0, 0, 20], can_be_held: true}
+- {name: cup, shape: cylinder, size: [32, 90], pose: [340, -260, 0, 0, 0, 0], can_be_held: true}
+- {name: space, shape: box, size: [20, 40, 100], pose: [650, 0, 0, 0, 0, 0], zone: keep_out}
+"""
+
+
+def unpacked(where: Path, urdf: Path = URDF_PATH, *options: str) -> Path:
     """Return the folder of a model as the command writes it and unzip unpacks it."""
-    assert main(["export", "mjcf", "--urdf", str(urdf), "--out", str(where)]) == 0
+    assert main(["export", "mjcf", "--urdf", str(urdf), "--out", str(where), *options]) == 0
     (archive,) = where.glob("*.zip")
     assert archive.stat().st_size < LARGEST_ZIP
     zipfile.ZipFile(archive).extractall(where)
@@ -206,6 +222,31 @@ def test_scene_has_a_floor(folder: Path) -> None:
     assert model.geom("floor").type[0] == mujoco.mjtGeom.mjGEOM_PLANE
     data = begun(model)
     assert data.ncon == 0
+
+
+def test_scene_of_a_file_has_its_objects_and_their_joints(tmp_path: Path) -> None:
+    """They rest, and a torque beyond its friction opens the door to the end of its range."""
+    (tmp_path / "scene.yaml").write_text(SCENE, encoding="utf-8")
+    folder = unpacked(tmp_path, URDF_PATH, "--scene", str(tmp_path / "scene.yaml"))
+    model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+    data, door = begun(model), model.joint("parts of door")
+    assert data.joint(door.id).qpos[0] == pytest.approx(math.radians(30.0))
+    assert door.range == pytest.approx([0.0, math.radians(90.0)], abs=1e-5)
+    places = {name: data.body(name).xpos.copy() for name in ("cube", "cup")}
+    assert places["cube"] == pytest.approx([0.4, -0.1, 0.0])
+    assert model.body("cup").mass[0] == pytest.approx(0.0614, abs=1e-4)
+    assert not any("space" in model.geom(number).name for number in range(model.ngeom))
+    for torque, angle in ((0.049, 30.0), (0.2, 90.0)):
+        data.qfrc_applied[door.dofadr[0]] = torque
+        mujoco.mj_step(model, data, 3000)
+        assert math.degrees(data.joint(door.id).qpos[0]) == pytest.approx(angle, abs=0.2)
+    for name, place in places.items():
+        assert data.body(name).xpos == pytest.approx(place, abs=1e-4)
+
+
+def test_only_mjcf_has_the_scene_of_a_file(tmp_path: Path) -> None:
+    options = ["export", "glb", "--out", str(tmp_path), "--scene", "scene.yaml"]
+    assert main(options) == 1
 
 
 def test_another_mechanism_is_a_model_too(tmp_path: Path, gantry: Robot) -> None:

@@ -55,7 +55,7 @@ def _files(options: argparse.Namespace, robot: Robot) -> Mapping[str, bytes]:
         case "urdf":
             return package_files(options.urdf)
         case "mjcf":
-            return mjcf_files(read_robot(options.urdf, None, find_arm))
+            return mjcf_files(read_robot(options.urdf, None, find_arm), options.scene)
     objects = initial_objects(robot) if options.objects else ()
     world = world_of(robot, values, objects)
     return (vrml_files if options.format == "vrml" else x3d_files)(robot, world)

@@ -12,11 +12,13 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.objects.loose_objects import Grasping
+from katana450.arm.control.commands.commands import ReplaceScene
+from katana450.arm.control.objects.loose_objects import Grasping, can_move
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.link import Inertial, Joint, Link
 from katana450.arm.robot.robot import Robot
@@ -24,19 +26,19 @@ from katana450.arm.robot.structure import ARM_JOINTS
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import PrimitiveShape, Visual
 from katana450.assembly.robot_session import arm_session
+from katana450.errors import InputError
+from katana450.extension import load
 from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
 from katana450.extensions.export.files import distinct, zipped
 from katana450.extensions.export.obj_text import obj_text
-from katana450.maths.collision.linkage import Linkage
+from katana450.maths.collision.linkage import GROUND, Linkage
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.physics import model as physics
 from katana450.maths.physics.suction import SEAL_GAP, SuctionCup
+from katana450.maths.water.units import GRAVITY
 from katana450.settings import Settings
-
-GRAVITY = 9.81
-"""[m/s^2]"""
 
 SAG = 1e-3
 """[rad, m] Maximum displacement of a joint at rest by the weight that it carries."""
@@ -139,9 +141,10 @@ def is_frame(robot: Robot, link: Link) -> bool:
 
 def drives_of(robot: Robot, grip: HandDrive | None) -> dict[str, Drive]:
     """Return a drive for each movable joint of ``robot``, for the fingers that of ``grip``."""
-    carried = {joint.name: _carried(robot, link, joint) for link, joint in moved_links(robot)}
+    moved_links = [(link, link.joint) for link in robot.links if link.joint is not None]
+    carried = {joint.name: _carried(robot, link, joint) for link, joint in moved_links}
     drives: dict[str, Drive] = {}
-    for _, joint in moved_links(robot):
+    for _, joint in moved_links:
         # A drive carries the joints that follow it too.
         moved = [
             (abs(other.factor), *carried[other.name])
@@ -167,13 +170,6 @@ def drives_of(robot: Robot, grip: HandDrive | None) -> dict[str, Drive]:
             stiffness, armature, joint.damping or spring, joint.friction, force
         )
     return drives
-
-
-def moved_links(robot: Robot) -> Iterator[tuple[Link, Joint]]:
-    """Yield every link that has a movable joint, with the joint."""
-    for link in robot.links:
-        if link.joint is not None:
-            yield link, link.joint
 
 
 def _carried(robot: Robot, link: Link, joint: Joint) -> tuple[float, float]:
@@ -205,16 +201,17 @@ def _travel(link: Link) -> float:
     return max(ends, default=0.0)
 
 
-def home_of(robot: Robot) -> Mapping[str, float]:
-    """Return the value of every joint [rad or m] at the app's home; of a mechanism at zero."""
-    arm = robot.arm
+def keyframes(robot: Robot) -> dict[str, Mapping[str, float]]:
+    """Return the values of all joints [rad or m] at home and zero; a mechanism is at zero."""
+    zero, arm = robot.every({}), robot.arm
     if arm is None:
-        return robot.every({})
-    return robot.every(arm.joint_values(arm.ready(Settings.ready), arm.gripper.clamp(0.0)))
+        return {"home": zero, "zero": zero}
+    home = arm.joint_values(arm.ready(Settings.ready), arm.gripper.clamp(0.0))
+    return {"home": robot.every(home), "zero": zero}
 
 
 def home_vector(robot: Robot) -> FloatArray:
-    """Return `home_of` as the joint values (k,) [rad or m] of a collision world of ``robot``."""
+    """Return the joint values (k,) [rad or m] of a collision world of ``robot`` at home."""
     arm = robot.arm
     if arm is None:
         home = robot.every({})
@@ -248,8 +245,9 @@ def excluded_pairs(robot: Robot) -> list[tuple[str, str]]:
     ]
 
 
+SCENE_FILE = "katana450.extensions.importers.formats.scene_file:load_initial_scene"
 WORLD = "world"
-"""Name that MuJoCo keeps for its own root."""
+"""Function that reads a scene, and the name that MuJoCo keeps for its own root."""
 
 OPTION = {
     "integrator": "implicitfast",
@@ -298,18 +296,27 @@ SCENE = {
         "height": "192",
     },
     "light": {"pos": "1 -1 2.5", "dir": "-0.4 0.4 -1", "castshadow": "true"},
-    "geom": {"name": "floor", "type": "plane", "size": "2 2 0.05", "rgba": "0.75 0.77 0.8 1"},
+    "geom": {
+        **{"name": "floor", "type": "plane", "size": "2 2 0.05", "rgba": "0.75 0.77 0.8 1"},
+        "contype": "0",
+    },
 }
-"""Sky, light and floor of the scene."""
+"""Sky, light and floor of the scene. Bodies on joints pass through the floor."""
 
 
-def mjcf_files(robot: Robot) -> dict[str, bytes]:
-    """Return name and content of the zip for ``robot``."""
+def mjcf_files(robot: Robot, scene: Path | None = None) -> dict[str, bytes]:
+    """Return name and content of the zip for ``robot``, with the objects of the file ``scene``.
+
+    Raises InputError for a scene that cannot be read or has the name of a link.
+    """
     model = _Model(robot)
     (name,) = distinct([robot.name])
+    root, floor = model.root(), _scene(f"{name}.xml", robot)
+    if scene is not None:
+        _add_objects(floor, root, robot, scene)
     files = {
-        f"{name}.xml": _text(model.root()),
-        "scene.xml": _text(_scene(f"{name}.xml", robot)),
+        f"{name}.xml": _text(root),
+        "scene.xml": _text(floor),
         **{f"meshes/{file}.obj": text.encode() for file, text in model.meshes.items()},
     }
     return {
@@ -328,6 +335,7 @@ class _Model:
         self.meshes: dict[str, str] = {}
         self._robot = robot
         self._grip = grip_of(robot)
+        self._suction = 0.0 if self._grip is None else self._grip.suction
         self._drives = drives_of(robot, self._grip)
         self._assets = ET.Element("asset")
         shown = dict.fromkeys(shape.material for link in robot.links for shape in link.shapes)
@@ -352,7 +360,7 @@ class _Model:
         defaults = ET.SubElement(root, "default")
         ET.SubElement(defaults, "geom", {"friction": _numbers(LINK_FRICTION), **CONTACT})
         holds = ET.SubElement(defaults, "default", {"class": HAND})
-        cup = CUP if self._grip is not None and self._grip.suction else {}
+        cup = CUP if self._suction else {}
         ET.SubElement(holds, "geom", {"friction": _numbers(HAND_FRICTION), "condim": "4", **cup})
         root.append(self._assets)
         for material, name in self._materials.items():
@@ -452,14 +460,13 @@ class _Model:
                 },
             )
 
-        if self._grip is not None and self._grip.suction:
+        if self._grip is not None and self._suction:
             cup = {"name": "suction", "body": _body(min(self._grip.links)), "ctrlrange": "0 1"}
-            cup["gain"] = _numbers([self._grip.suction], 5)
-            ET.SubElement(actuators, "adhesion", cup)
+            ET.SubElement(actuators, "adhesion", cup, gain=_numbers([self._suction], 5))
 
     def _add_keyframes(self, root: ET.Element) -> None:
         frames = ET.SubElement(root, "keyframe")
-        off = [0.0] if self._grip is not None and self._grip.suction else []
+        off = [0.0] if self._suction else []
         for name, values in keyframes(self._robot).items():
             ET.SubElement(
                 frames,
@@ -477,11 +484,6 @@ class _Model:
             if link.joint is not None:
                 yield link.joint
             waiting += reversed(self._robot.children(link))
-
-
-def keyframes(robot: Robot) -> dict[str, Mapping[str, float]]:
-    """Return the values of all joints [rad or m] at the app's home and at zero."""
-    return {"home": home_of(robot), "zero": robot.every({})}
 
 
 def _body(link: str) -> str:
@@ -546,6 +548,33 @@ def _scene(model: str, robot: Robot) -> ET.Element:
     ET.SubElement(world, "light", SCENE["light"])
     ET.SubElement(world, "geom", SCENE["geom"])
     return root
+
+
+def _add_objects(floor: ET.Element, model: ET.Element, robot: Robot, scene: Path) -> None:
+    """Add the objects of a file to the scene ``floor``, and the keyframes of ``model`` with them.
+
+    MuJoCo refuses a keyframe without the places of all bodies.
+    """
+    session = arm_session(Settings(), robot).session
+    stored = load(SCENE_FILE)(session, scene).scene
+    state = session.begin(session.ready, session.require_arm().gripper.opened, 0.0)
+    state = session.step(state, (ReplaceScene(stored.objects, stored.water),), 0.0)
+    bodies, parts = session.loose_objects.scene(state)
+    shared = {WORLD, *(link.name for link in robot.links)} & {body.name for body in bodies}
+    if shared:
+        raise InputError(f"The object {min(shared)} has the name of a link. Rename it.")
+    movable = [item for item in state.objects if can_move(item)]
+    poses = session.loose_objects.poses(movable, state.x_setpoint)
+    parts = [part for part in parts if part.mover == GROUND]
+    text, places = physics.scene_text(parts, bodies, poses)
+    objects = ET.fromstring(text)
+    for section in floor:
+        section.extend(objects.iterfind(f"{section.tag}/*"))
+    for frames in model.findall("keyframe"):
+        model.remove(frames)
+        floor.append(frames)
+        for key in frames:
+            key.set("qpos", f"{key.get('qpos')} {_numbers(places)}")
 
 
 def _place(T: FloatArray) -> dict[str, str]:

@@ -58,6 +58,9 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="vrml and x3d: leave out the cup and the basin of a new server",
     )
+    parser.add_argument(
+        "--scene", type=Path, metavar="FILE", help="mjcf: with the objects of a scene file"
+    )
     add_pose_option(parser, "all at zero")
     add_arm_options(parser, tool=False)
 
@@ -80,6 +83,8 @@ def export_format(options: argparse.Namespace) -> int:
     if not row.scene and not options.objects:
         names = " or ".join(name for name, listed in FORMATS.items() if listed.scene)
         raise InputError(f"{options.format} has no objects. Use --no-objects with {names}.")
+    if options.scene is not None and options.format != "mjcf":
+        raise InputError(f"{options.format} has no scene of a file. Use --scene with mjcf.")
     if options.pose and not row.posed:
         names = ", ".join(name for name, listed in FORMATS.items() if listed.posed)
         raise InputError(f"{options.format} has no pose. Use --pose with {names}.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -249,12 +249,7 @@ def compile_model(
     option.noslip_iterations = SLIP_STEPS
     builder = _Builder(spec)
     for body in bodies:
-        frame = spec.worldbody.add_body()
-        if body.joint is None:
-            frame.add_freejoint()
-        else:
-            _add_joint(frame, body.joint)
-        builder.add_body(frame, body)
+        builder.add_body(body)
     frames = {GROUND: spec.worldbody}
     variable = drive.variable if isinstance(drive, FingerDrive) else None
     fingers = tuple(g for g in range(1, linkage.count) if linkage.variable[g] == variable)
@@ -286,13 +281,49 @@ def compile_model(
     return Model(compiled, links, frozen(origins[list(links)]), fingers, owners)
 
 
+def scene_text(
+    parts: Sequence[Part],
+    bodies: Sequence[RigidBody],
+    poses: Mapping[str, FloatArray],
+) -> tuple[str, FloatArray]:
+    """Return ``bodies`` among fixed ``parts`` as MJCF without a robot, and their places (q,) there.
+
+    All meet each other and a robot, but bodies on joints meet no part and no such body.
+
+    Args:
+        parts: of the ground.
+        bodies: those on joints last.
+        poses: pose (4, 4) of each body in the base frame [m].
+    """
+    import mujoco
+
+    spec = mujoco.MjSpec()
+    builder = _Builder(spec)
+    positions = []
+    for body in bodies:
+        frame, T = builder.add_body(body, body.name), poses[body.name]
+        if body.joint is None:
+            frame.pos, frame.quat = T[:3, 3], so3.to_quaternion(T[:3, :3])
+        else:
+            positions.append(body.joint.position(_shifted(T, np.array(body.joint.point))))
+    for part in parts:
+        builder.add_part(spec.worldbody, part, is_hand=False)
+    for number, (_, meets) in enumerate(builder.bits):
+        geom = spec.geom(str(number))
+        geom.contype, geom.conaffinity = int(meets == LINK | BODY), 1
+        geom.name = f"{builder.owners[number]} {number}"
+    places = spec.compile().qpos0.copy()
+    places[len(places) - len(positions) :] = positions
+    return spec.to_xml(), places
+
+
 class _Builder:
     """Adds geometries to a specification, and remembers what each of them meets."""
 
     def __init__(self, spec: Any) -> None:
         self._spec = spec
-        self._bits: list[tuple[int, int]] = []
-        self._owners: list[str] = []
+        self.bits: list[tuple[int, int]] = []
+        self.owners: list[str] = []
         self._joints: dict[int, Any] = {}
         self._meshes: dict[tuple[bytes, bool], str] = {}
 
@@ -350,16 +381,23 @@ class _Builder:
         for T, shape in zip(part.T_mover_shape, part.shapes, strict=True):
             # Contacts of a face have several points only with the faces of its hull.
             self._add(frame, T, shape, friction, bits, solid=is_hand).mass = 0.0
-            self._owners.append(part.name)
+            self.owners.append(part.name)
 
-    def add_body(self, frame: Any, body: RigidBody) -> None:
+    def add_body(self, body: RigidBody, name: str = "") -> Any:
+        """Return the frame of ``body`` with its joint and its pieces."""
+        frame = self._spec.worldbody.add_body(name=name)
+        if body.joint is None:
+            frame.add_freejoint(name=name)
+        else:
+            _add_joint(frame, body.joint, name)
         volumes = [volume(shape) for shape in body.shapes]
         for T, shape, size in zip(body.T_body_shape, body.shapes, volumes, strict=True):
             friction = body.friction, SPIN_FRICTION
             meets = LINK | BODY if body.joint is None else LINK
             geom = self._add(frame, T, shape, friction, (BODY, meets), solid=True)
             geom.mass = body.mass * size / math.fsum(volumes)
-        self._owners += body.owners or (body.name,) * len(body.shapes)
+        self.owners += body.owners or (body.name,) * len(body.shapes)
+        return frame
 
     def _add(
         self,
@@ -378,7 +416,7 @@ class _Builder:
         if bits[1] and kind in ("sphere", "cylinder"):
             dimensions = ROLLING
         geom = frame.add_geom(
-            name=str(len(self._bits)),
+            name=str(len(self.bits)),
             type=mujoco.mjtGeom(KINDS[kind]),
             pos=T[:3, :3] @ shape.middle + T[:3, 3],
             quat=so3.to_quaternion(T[:3, :3]),
@@ -390,7 +428,7 @@ class _Builder:
         )
         geom.solref[:2] = CONTACT_TIME, CONTACT_DAMPING
         geom.solimp[:5] = CONTACT_STIFFNESS
-        self._bits.append(bits)
+        self.bits.append(bits)
         if kind == "hull":
             geom.meshname = self._mesh(shape, solid=solid)
         else:
@@ -414,24 +452,25 @@ class _Builder:
 
     def set_meetings(self, compiled: Any) -> tuple[str, ...]:
         """Set what each geometry of the ``compiled`` model meets; return whose each is."""
-        owners = [""] * len(self._bits)
-        for number, (kind, meets) in enumerate(self._bits):
+        owners = [""] * len(self.bits)
+        for number, (kind, meets) in enumerate(self.bits):
             geom = compiled.geom(str(number)).id
             body = compiled.geom_bodyid[geom]
             compiled.geom_contype[geom], compiled.geom_conaffinity[geom] = kind, meets
             compiled.body_contype[body] |= kind
             compiled.body_conaffinity[body] |= meets
-            owners[geom] = self._owners[number]
+            owners[geom] = self.owners[number]
         return tuple(owners)
 
 
-def _add_joint(frame: Any, joint: BodyJoint) -> None:
+def _add_joint(frame: Any, joint: BodyJoint, name: str) -> None:
     """Let the body of ``frame`` move by ``joint``, whose friction and ends are hard contacts."""
     import mujoco
 
     kinds, ends = mujoco.mjtJoint, (joint.lower, joint.upper)
     frame.pos = joint.point
     added = frame.add_joint(
+        name=name,
         type=kinds.mjJNT_SLIDE if joint.slides else kinds.mjJNT_HINGE,
         axis=joint.axis,
         limited=mujoco.mjtLimited.mjLIMITED_TRUE,

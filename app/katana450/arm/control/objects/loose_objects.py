@@ -269,11 +269,7 @@ class LooseObjects:
             return state
         simulation = self._simulation(state, movable)
         start, end = before.x_setpoint, state.x_setpoint
-        poses = {}
-        for item in movable:
-            T = self._environment.pose(item, start)
-            poses[_body_name(item)] = T if item.joint is None else item.joint.body_pose(T)
-        motion = simulation.begin(poses, motion, moved, woken)
+        motion = simulation.begin(self.poses(movable, start), motion, moved, woken)
         if dt <= 0.0:
             return replace(state, bodies=motion)
         grasp = self._grasp(before, state, motion, simulation.finger_joint(motion))
@@ -375,16 +371,33 @@ class LooseObjects:
         if self._cache is None or self._cache[0] != key:
             world = self._environment.bodies
             assert world is not None
-            parts_of: dict[str, list[SceneObject]] = {}
-            for item in loose:
-                parts_of.setdefault(_body_name(item), []).append(item)
-            bodies = [self._body(name, parts, state) for name, parts in parts_of.items()]
+            bodies, standing = self.scene(state)
             parts = [part for part in world.parts if part.name != "table"]
-            parts += [self._part(scene_object) for scene_object in others]
+            parts += standing
             drive = None if self._hand is None else self._hand.drive
             simulation = BodySimulation(world.linkage, (*parts, *self._ground()), bodies, drive)
             self._cache = (key, simulation)
         return self._cache[1]
+
+    def poses(self, movable: Sequence[SceneObject], x: FloatArray) -> dict[str, FloatArray]:
+        """Return the pose (4, 4) of the body of each object [m], with the arm at ``x`` (k,)."""
+        poses = {}
+        for item in movable:
+            T = self._environment.pose(item, x)
+            poses[_body_name(item)] = T if item.joint is None else item.joint.body_pose(T)
+        return poses
+
+    def scene(self, state: State) -> tuple[list[RigidBody], list[Part]]:
+        """Return the bodies of the objects, those on joints last, and the parts that stand still.
+
+        Objects that are attached to the hand are parts of it.
+        """
+        items = [item for item in state.objects if not item.is_zone]
+        parts_of: dict[str, list[SceneObject]] = {}
+        for item in sorted(filter(can_move, items), key=lambda item: item.joint is not None):
+            parts_of.setdefault(_body_name(item), []).append(item)
+        bodies = [self._body(name, parts, state) for name, parts in parts_of.items()]
+        return bodies, [self._part(item) for item in items if not can_move(item)]
 
     def mass(self, scene_object: SceneObject, state: State) -> float:
         """Return the mass of an object [kg], for a vessel with the water in it."""

@@ -119,7 +119,7 @@ class Session:
         self.pouring = (
             None if water_environment is None else Pouring(water_environment, self.environment)
         )
-        self._loose_objects = LooseObjects(self.environment, water_environment)
+        self.loose_objects = LooseObjects(self.environment, water_environment)
         self._slow_zones = SlowZones(self.environment)
         self._robot = robot
         self._limits = robot.limits
@@ -220,7 +220,7 @@ class Session:
         if state.mode is IDLE and state.motion.at_rest and state.goal is not state.setpoint:
             # A brake can end one rounding beside its predicted end.
             state = replace(state, goal=state.setpoint)
-        state = self._loose_objects.step(before, state, dt)
+        state = self.loose_objects.step(before, state, dt)
         state = gripped(self.environment, before, state, dt)
         if self.pouring is not None and state.poured is not None:
             x = state.x_setpoint
