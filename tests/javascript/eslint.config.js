@@ -2,6 +2,8 @@ import js from "@eslint/js";
 import globals from "globals";
 
 export default [
+  // A library.
+  { ignores: ["static/uplot/"] },
   js.configs.recommended,
   {
     files: ["static/**/*.js"],

@@ -98,7 +98,7 @@ def texts_of_page() -> set[str]:
     document = KEPT.sub("<i>", (STATIC / "index.html").read_text("utf-8"))
     texts = set(re.findall(r">([^<>]+)<", document) + ATTRIBUTE.findall(document))
     for path, content in contents().items():
-        if path.endswith(".js"):
+        if path.endswith(".js") and not path.startswith("uplot/"):
             source = re.sub(r"\$\{[^{}`]*\}", "{}", content.decode())
             strings = {quoted or template for quoted, template in STRING.findall(source)}
             texts |= {text for text in strings if WORDS.match(text) and not CODE.match(text)}
