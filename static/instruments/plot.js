@@ -1,25 +1,27 @@
-// A plot of some channels over the last seconds, with a cursor for reading.
+// A plot of some channels over the last seconds, drawn by uPlot, with a cursor for reading.
 import { t, write } from "../dom.js";
+import uPlot from "../uplot/uPlot.esm.js";
 import { GAP } from "./history.js";
 import { toggle } from "./parts.js";
-import { digits, scale } from "./scale.js";
 import { clamp, html, set, signed } from "./shape.js";
 
 /** @typedef {{ span: number, end: number | null }} Span */
-/** @typedef {{ left: number, right: number, top: number, bottom: number }} Box */
-/** @typedef {(value: number) => number} Place */
 /** @typedef {{ at: number, text: string, line: string, font: string, series: string[] }} Palette */
-/** @typedef {{ low: number, high: number, by: number }} Axis */
-const MARGIN = { left: 42, right: 8, top: 8, bottom: 18 }; // px
-const LINE_HEIGHT = 24; // px between horizontal lines, about
-/** @type {Record<number, number>} */
-const APART = { 10: 2, 30: 5, 120: 20 }; // s between vertical lines, for each span
-const LABEL_WIDTH = 56; // px for the time below a line; the outermost labels are not centred
+const APART = [2, 5, 10, 20, 40, 60]; // s between vertical lines
+const LABEL_WIDTH = 56; // px for the time below a line
+const LINE_HEIGHT = 24; // px between horizontal lines, at least
 const COLOURS_KEPT = 500; // ms
 const SERIES = 5; // number of colours in instruments.css; further lines repeat them
 const READ_BY = 0.01; // fraction of the width by which a key moves the cursor
 /** @type {Record<string, number>} */
 const READ_KEYS = { ArrowLeft: -READ_BY, ArrowRight: READ_BY };
+
+/** Return the number of decimals of the multiples of `by`. @param {number} by */
+function digits(by) {
+  let count = 0;
+  while (Math.abs(Math.round(by * 10 ** count) / 10 ** count - by) > 1e-9 * by) count += 1;
+  return count;
+}
 
 export class Plot {
   #history;
@@ -27,10 +29,10 @@ export class Plot {
   #least;
   #digits;
   #legend;
-  #canvas = html("canvas", { tabindex: 0, role: "img" });
-  #size = { width: 0, height: 0 };
-  /** @type {number | null} */
-  #cursor = null; // fraction of the width
+  #box = html("div", { class: "drawn", tabindex: 0, role: "img" });
+  #when = html("output", { hidden: "" });
+  /** @type {uPlot | null} */
+  #plot = null;
   #stale = true;
   #drawn = 0;
   /** @type {Palette} */
@@ -48,17 +50,13 @@ export class Plot {
     this.#view = view;
     this.#least = least;
     this.#digits = decimals;
-    set(this.#canvas, "aria-label", `${title} over time; arrow keys move a cursor along it`);
+    set(this.#box, "aria-label", `${title} over time; arrow keys move a cursor along it`);
     this.#legend = channels.map((channel, i) => this.#entry(channel, i));
-    this.element = html(
-      "div",
-      { class: "plot" },
-      this.#canvas,
-      html("div", { class: "legend" }, ...this.#legend.map(({ button }) => button)),
-    );
+    this.element = html("div", { class: "plot" }, this.#box, html("div", { class: "legend" }, ...this.#legend.map(({ button }) => button)));
+    this.#box.append(this.#when);
+    new ResizeObserver(() => this.#resize()).observe(this.#box);
     this.#listen();
   }
-
   // Draw again, because something other than time has changed.
   refresh() {
     this.#stale = true;
@@ -66,13 +64,13 @@ export class Plot {
 
   draw() {
     const now = performance.now();
-    const { width, height } = this.#size;
     // A plot that would move by less than half a pixel is not drawn again.
-    if (!this.#stale && now - this.#drawn < (500 * this.#view.span) / Math.max(1, width)) return;
-    if (!width || !height) return;
+    if (!this.#plot || (!this.#stale && now - this.#drawn < (500 * this.#view.span) / this.#plot.width)) return;
     this.#stale = false;
     this.#drawn = now;
-    this.#paint();
+    this.#colours = this.#palette(now);
+    this.#plot.setData(this.#data());
+    this.#read();
   }
 
   /** @param {number} channel @param {number} i */
@@ -81,190 +79,111 @@ export class Plot {
     const { label, short = label } = this.#history.channels[channel];
     // The rest of the label is for screen readers: a name has to contain what is seen.
     const name = html("span", {}, html("small", {}, label.slice(0, label.length - short.length)), short);
-    const button = toggle([html("i"), name, value], () => this.refresh(), { "aria-pressed": true, class: `series-${(i % SERIES) + 1}` });
+    const button = toggle([html("i"), name, value], (on) => {
+      this.#plot?.setSeries(i + 1, { show: on });
+      this.refresh();
+    }, { "aria-pressed": true, class: `series-${(i % SERIES) + 1}` });
     return { channel, button, value };
   }
 
+  // The times before the end of the view [s], and the values of each channel; a row without values interrupts the lines.
+  #data() {
+    const history = this.#history;
+    const to = this.#view.end ?? history.newest;
+    /** @type {number[]} */
+    const times = [];
+    const values = this.#legend.map(() => /** @type {(number | null)[]} */ ([]));
+    const first = Math.max(history.first, history.at(to - this.#view.span) - 1);
+    for (let n = first; n < history.end && history.time(n) <= to; n++) {
+      const gap = n > first && history.time(n) - history.time(n - 1) > GAP;
+      // Between its ends, so that the times increase.
+      for (const time of gap ? [history.time(n) - GAP / 2, history.time(n)] : [history.time(n)]) {
+        times.push(time - to);
+        this.#legend.forEach(({ channel }, i) => {
+          const value = time < history.time(n) ? NaN : history.value(channel, n);
+          values[i].push(Number.isNaN(value) ? null : value);
+        });
+      }
+    }
+    return /** @type {uPlot.AlignedData} */ ([times, ...values]);
+  }
+
+  #resize() {
+    const { clientWidth: width, clientHeight: height } = this.#box;
+    if (!width || !height) return;
+    this.#colours = this.#palette(performance.now());
+    if (this.#plot) this.#plot.setSize({ width, height });
+    else this.#box.prepend((this.#plot = this.#made(width, height)).root);
+    this.refresh();
+  }
+
+  /** @param {number} width @param {number} height */
+  #made(width, height) {
+    const stroke = () => this.#colours.text;
+    const grid = { stroke: () => this.#colours.line, width: 1 };
+    const { font } = this.#colours;
+    return new uPlot({
+      width, height, legend: { show: false }, padding: [8, 16, 0, 0],
+      cursor: { y: false, drag: { x: false, y: false }, points: { size: 7 } },
+      scales: {
+        x: { time: false, range: () => [-this.#view.span, 0] },
+        y: {
+          range: (_, low, high) => {
+            const spare = Math.max(this.#least - ((high ?? 0) - (low ?? 0)), 0) / 2;
+            return uPlot.rangeNum((low ?? 0) - spare, (high ?? 0) + spare, 0.1, true);
+          },
+        },
+      },
+      axes: [
+        {
+          stroke, grid, font, ticks: { show: false }, size: 20, gap: 4, incrs: APART, space: LABEL_WIDTH,
+          values: (_, times) => times.map((time) => t(time < 0 ? `−${-time} s` : this.#view.end === null ? "now" : "paused")),
+        },
+        {
+          stroke, grid, font, ticks: { show: false }, size: 44, gap: 4, space: LINE_HEIGHT,
+          values: (_, values, _axis, _space, by) => values.map((value) => t(signed(value, digits(by)))),
+        },
+      ],
+      series: [{}, ...this.#legend.map((_, i) => ({ stroke: () => this.#colours.series[i], width: 1.5, points: { show: false } }))],
+      hooks: { setCursor: [() => this.#read()] },
+    }, this.#data());
+  }
+
   #listen() {
-    const canvas = this.#canvas;
-    new ResizeObserver(() => {
-      const { clientWidth, clientHeight } = canvas;
-      this.#size = { width: clientWidth, height: clientHeight };
-      canvas.width = Math.round(clientWidth * devicePixelRatio);
-      canvas.height = Math.round(clientHeight * devicePixelRatio);
-      this.refresh();
-    }).observe(canvas);
-    /** @param {number | null} fraction */
-    const read = (fraction) => {
-      this.#cursor = fraction === null ? null : clamp(fraction, 0, 1);
-      this.refresh();
-    };
-    /** @param {PointerEvent} event */
-    const across = ({ offsetX }) => (offsetX - MARGIN.left) / (this.#size.width - MARGIN.left - MARGIN.right);
-    canvas.addEventListener("pointermove", (event) => read(across(event)));
-    canvas.addEventListener("pointerdown", (event) => read(across(event)));
-    canvas.addEventListener("pointerleave", () => read(null));
-    canvas.addEventListener("blur", () => read(null));
-    canvas.addEventListener("keydown", (event) => {
+    this.#box.addEventListener("keydown", (event) => {
       const by = READ_KEYS[event.key];
-      if (by === undefined) return;
+      const { clientWidth: width = 0 } = this.#plot?.over ?? {};
+      if (by === undefined || !width) return;
       event.preventDefault();
-      read((this.#cursor ?? 1) + by);
+      const { left = -1 } = this.#plot?.cursor ?? {};
+      this.#plot?.setCursor({ left: clamp((left < 0 ? width : left) + by * width, 0, width), top: 0 });
+    });
+    this.#box.addEventListener("blur", () => this.#plot?.setCursor({ left: -1, top: -1 }));
+    // uPlot follows a mouse alone.
+    this.#box.addEventListener("pointermove", ({ pointerType, clientX }) => {
+      const plot = this.#plot;
+      if (pointerType !== "mouse") plot?.setCursor({ left: clamp(clientX - plot.over.getBoundingClientRect().left, 0, plot.over.clientWidth), top: 0 });
     });
   }
 
   /** A canvas cannot use CSS variables, so the colours are read from elements that use them. @param {number} now */
   #palette(now) {
     if (now - this.#colours.at < COLOURS_KEPT) return this.#colours;
-    const { color, borderTopColor, fontFamily } = getComputedStyle(this.#canvas);
+    const { color, borderTopColor, fontFamily } = getComputedStyle(this.#box);
     const series = this.#legend.map(({ button }) => getComputedStyle(button.firstElementChild ?? button).backgroundColor);
-    this.#colours = { at: now, text: color, line: borderTopColor, font: `11px ${fontFamily}`, series };
-    return this.#colours;
+    return { at: now, text: color, line: borderTopColor, font: `11px ${fontFamily}`, series };
   }
 
-  #paint() {
-    const to = this.#view.end ?? this.#history.newest;
-    const from = to - this.#view.span;
-    const shown = this.#legend.map(({ button }) => button.getAttribute("aria-pressed") === "true");
-    const axis = this.#scale(from, to, shown);
-    const pen = this.#canvas.getContext("2d");
-    if (!pen) return;
-    const { width, height } = this.#size;
-    const box = {
-      left: MARGIN.left, right: width - MARGIN.right, top: MARGIN.top, bottom: height - MARGIN.bottom,
-    };
-    /** @type {Place} */
-    const x = (t) => box.left + ((t - from) / (to - from)) * (box.right - box.left);
-    /** @type {Place} */
-    const y = (value) => box.bottom - ((value - axis.low) / (axis.high - axis.low)) * (box.bottom - box.top);
-    const colours = this.#palette(this.#drawn);
-    pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
-    pen.clearRect(0, 0, width, height);
-    this.#grid(pen, box, axis, y, colours);
-    pen.save();
-    pen.beginPath();
-    pen.rect(box.left, box.top - 2, box.right - box.left, box.bottom - box.top + 4);
-    pen.clip();
-    pen.lineWidth = 1.5;
-    pen.lineJoin = "round";
-    if (this.#history.end)
-      this.#legend.forEach(({ channel }, i) => shown[i] && this.#trace(pen, channel, colours.series[i], from, to, x, y));
-    pen.restore();
-    this.#readOut(pen, box, from, to, x, y, shown, colours);
-  }
-
-  /** @param {number} from @param {number} to @param {boolean[]} shown */
-  #scale(from, to, shown) {
-    let [low, high] = [Infinity, -Infinity];
-    for (let n = this.#history.at(from); n < this.#history.end && this.#history.time(n) <= to; n += 1)
-      this.#legend.forEach(({ channel }, i) => {
-        const value = this.#history.value(channel, n);
-        if (!shown[i] || Number.isNaN(value)) return;
-        low = Math.min(low, value);
-        high = Math.max(high, value);
-      });
-    const lines = Math.max(2, this.#size.height / LINE_HEIGHT);
-    return low <= high ? scale(low, high, this.#least, lines) : scale(0, 0, this.#least, lines);
-  }
-
-  /** @param {CanvasRenderingContext2D} pen @param {Box} box @param {Axis} axis @param {Place} y @param {Palette} palette */
-  #grid(pen, box, axis, y, { text, line, font }) {
-    const { span, end } = this.#view;
-    pen.strokeStyle = line;
-    pen.fillStyle = text;
-    pen.font = font;
-    pen.lineWidth = 1;
-    pen.beginPath();
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    for (let k = 0; axis.low + k * axis.by <= axis.high + axis.by / 2; k += 1) {
-      const value = axis.low + k * axis.by;
-      const at = Math.round(y(value)) + 0.5;
-      pen.moveTo(box.left, at);
-      pen.lineTo(box.right, at);
-      pen.fillText(t(signed(value, digits(axis.by))), box.left - 6, at);
-    }
-    pen.textBaseline = "alphabetic";
-    const room = ((box.right - box.left) * APART[span]) / span;
-    const labelled = APART[span] * Math.ceil(LABEL_WIDTH / room);
-    for (let back = 0; back <= span; back += APART[span]) {
-      const at = Math.round(box.right - ((box.right - box.left) * back) / span) - 0.5;
-      pen.moveTo(at, box.top);
-      pen.lineTo(at, box.bottom);
-      if (back % labelled) continue;
-      pen.textAlign = back === 0 ? "right" : back === span ? "left" : "center";
-      pen.fillText(t(back > 0 ? `−${back} s` : end === null ? "now" : "paused"), at, box.bottom + 14);
-    }
-    pen.stroke();
-  }
-
-  // If there are more samples than pixels, draw the minimum and the maximum of each few.
-  /**
-   * @param {CanvasRenderingContext2D} pen @param {number} channel @param {string} colour @param {number} from
-   * @param {number} to @param {Place} x @param {Place} y
-   */
-  #trace(pen, channel, colour, from, to, x, y) {
-    const history = this.#history;
-    const first = Math.max(history.first, history.at(from) - 1);
-    const end = Math.min(history.end, history.at(to) + 1);
-    const few = Math.max(1, Math.floor((end - first) / this.#size.width));
-    let before = -Infinity;
-    pen.strokeStyle = colour;
-    pen.beginPath();
-    for (let n = first - (first % few); n < end; n += few) {
-      let [low, high] = [-1, -1];
-      for (let k = Math.max(n, first); k < Math.min(n + few, end); k += 1) {
-        const value = history.value(channel, k);
-        if (Number.isNaN(value)) continue;
-        if (low < 0 || value < history.value(channel, low)) low = k;
-        if (high < 0 || value > history.value(channel, high)) high = k;
-      }
-      if (low < 0) continue;
-      for (const k of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) {
-        const t = history.time(k);
-        const height = y(history.value(channel, k));
-        if (t - before > GAP) pen.moveTo(x(t), height);
-        else pen.lineTo(x(t), height);
-        before = t;
-      }
-    }
-    pen.stroke();
-  }
-
-  /**
-   * @param {CanvasRenderingContext2D} pen @param {Box} box @param {number} from @param {number} to @param {Place} x
-   * @param {Place} y @param {boolean[]} shown @param {Palette} palette
-   */
-  #readOut(pen, box, from, to, x, y, shown, { text, line, series }) {
-    const history = this.#history;
-    const read = this.#cursor !== null && history.end > 0;
-    const n = history.nearest(read ? from + (this.#cursor ?? 0) * (to - from) : to);
-    this.#legend.forEach(({ channel, value }) => {
-      const number = n < 0 ? NaN : history.value(channel, n);
-      write(value, Number.isNaN(number) ? "–" : signed(number, this.#digits));
+  // Show the values at the cursor, or the newest ones.
+  #read() {
+    const [times, ...values] = this.#plot?.data ?? [[]];
+    const read = this.#plot?.cursor.idx ?? null;
+    const n = read ?? times.length - 1;
+    this.#legend.forEach(({ value }, i) => {
+      const number = values[i]?.[n];
+      write(value, number == null ? "–" : signed(number, this.#digits));
     });
-    if (!read || n < 0 || history.time(n) < from) return;
-    const at = x(history.time(n));
-    pen.strokeStyle = text;
-    pen.lineWidth = 1;
-    pen.beginPath();
-    pen.moveTo(at, box.top);
-    pen.lineTo(at, box.bottom);
-    pen.stroke();
-    this.#legend.forEach(({ channel }, i) => {
-      if (!shown[i]) return;
-      pen.fillStyle = series[i];
-      pen.beginPath();
-      pen.arc(at, y(history.value(channel, n)), 3.5, 0, 2 * Math.PI);
-      pen.fill();
-    });
-    const words = t(`${signed(history.time(n) - to, 2)} s`);
-    const wide = pen.measureText(words).width + 10;
-    const left = clamp(at - wide / 2, box.left, box.right - wide);
-    pen.fillStyle = line;
-    pen.fillRect(left, box.bottom + 3, wide, 15);
-    pen.fillStyle = text;
-    pen.textAlign = "left";
-    pen.fillText(words, left + 5, box.bottom + 14);
+    this.#when.hidden = read === null;
+    if (read !== null) write(this.#when, `${signed(times[n], 2)} s`);
   }
 }

@@ -56,7 +56,7 @@ def test_a_knob_turns_a_joint_and_the_plots_follow(page: ViserPage, truth: Truth
     # A cursor reads the past: the points on the way, and the angle of before.
     pause = page.page.locator("#instruments .toolbar button", has_text="Pause")
     pause.click()
-    card(page, "joint-angles").locator("canvas").focus()
+    card(page, "joint-angles").locator(".drawn").focus()
     read: list[float] = []
     while not read or read[-1] > start + 0.1:
         assert len(read) < 100
@@ -65,7 +65,7 @@ def test_a_knob_turns_a_joint_and_the_plots_follow(page: ViserPage, truth: Truth
         read.append(legend(page, "joint-angles")[0])
     assert len({angle for angle in read if start + 1.0 < angle < reached - 1.0}) > 2
     assert read == sorted(read, reverse=True)
-    card(page, "joint-speeds").locator("canvas").focus()
+    card(page, "joint-speeds").locator(".drawn").focus()
     presses = 0
     while legend(page, "joint-speeds")[0] < 1.0:
         assert presses < 100

@@ -28,7 +28,7 @@ def rooms() -> dict[str, tuple[int, list[str]]]:
 def files_in(place: str) -> set[Path]:
     if place == "static":
         # The library for plots is not ours.
-        return {file for file in (ROOT / "static").rglob("*.js") if "uplot" not in file.parts}
+        return {file for file in (ROOT / "static").rglob("*.js") if file.parent.name != "uplot"}
     path = PACKAGE / place
     assert path.exists(), f"There is no {place}."
     return {path} if path.is_file() else set(path.rglob("*.py"))
