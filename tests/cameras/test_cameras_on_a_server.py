@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import time
@@ -10,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
@@ -36,7 +38,7 @@ def server(camera: MjpegCamera) -> Iterator[AppServer]:
     with AppServer(
         (
             *(*APP, f"--camera=table={camera.url}", "--camera=away=http://127.0.0.1:9/"),
-            "--camera=mine=browser",
+            *("--camera=mine=browser", "--camera=hand=simulated:wrist"),
         )
     ) as it:
         yield it
@@ -71,6 +73,22 @@ def test_pictures_are_new_and_a_slow_page_gets_fewer(server: AppServer) -> None:
         answer = asked(socket)
         assert isinstance(answer, tuple)
         assert 0.0 <= answer[0] < 0.15
+
+
+def test_simulated_hand_sees_where_the_arm_is(server: AppServer) -> None:
+    with opened(server, "hand") as socket:
+        wait_for_picture(socket)
+        before = asked(socket)
+        with katana450.connect(server.url) as arm:
+            arm.nudge(1, 0.3)
+        assert isinstance(before, tuple)
+        until(lambda: asked(socket)[1] != before[1])
+        # At rest the same picture comes again, as new as the state.
+        until(lambda: asked(socket)[1] == asked(socket)[1])
+        answer = asked(socket)
+        assert isinstance(answer, tuple)
+        assert answer[0] < 1.0
+        assert Image.open(io.BytesIO(answer[1])).size == (320, 240)
 
 
 def test_camera_that_cannot_be_reached_says_why(server: AppServer) -> None:

@@ -121,6 +121,7 @@ def test_pages_that_come_and_go_share_one_thread() -> None:
         (["table=http://a/", "table=http://b/"], "Two cameras have the same name"),
         ([f"{name}=http://a/" for name in "abcde"], "There are 5 cameras, of at most 4"),
         (["table=/dev/video0"], "need the extra 'cameras'"),
+        (["table=simulated:foot"], "no camera simulated:foot. Take simulated:wrist or simulated:o"),
     ],
 )
 def test_invalid_options_are_refused(

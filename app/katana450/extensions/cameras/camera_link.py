@@ -71,6 +71,11 @@ class CameraLink:
             with self._lock:
                 self._wakers.discard(wake)
 
+    @property
+    def is_watched(self) -> bool:
+        """True while somebody looks at a camera."""
+        return bool(self._wakers)
+
     def newest(self, name: str) -> Picture:
         """Return the newest picture of the camera ``name``."""
         return self._newest.get(name) or Picture(name, problem=NOT_READY)

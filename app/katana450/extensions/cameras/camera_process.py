@@ -27,7 +27,9 @@ from katana450.arm.runtime.pipes.private_listener import (
 )
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.errors import KatanaError
-from katana450.extensions.cameras.sources import BROWSER, frames
+from katana450.extension import ServerFacts
+from katana450.extensions.cameras.simulated import STATES, StateReceiver
+from katana450.extensions.cameras.sources import BROWSER, SIMULATED, CameraFrame, frames
 from katana450.platform_support import lower_priority
 
 PAGE, RECORDER, SHARER = "page", "recorder", "sharer"
@@ -68,17 +70,23 @@ class Picture(msgspec.Struct, frozen=True, array_like=True):
 
 @dataclass(frozen=True)
 class CamerasConfig:
-    """Configuration of the process: addresses of the cameras by name, and its own address."""
+    """Configuration of the process: addresses of the cameras by name, its own, and the server."""
 
     sources: Mapping[str, str]
     address: PrivateAddress
+    facts: ServerFacts
 
 
 class CameraReader:
     """Reads the cameras, each in a thread of its own, and sends their pictures."""
 
-    def __init__(self, sources: Mapping[str, str]) -> None:
-        """Begin to read ``sources``, the addresses of the cameras by name."""
+    def __init__(
+        self,
+        sources: Mapping[str, str],
+        frames: Callable[[str], Iterator[CameraFrame]] = frames,
+    ) -> None:
+        """Begin to read ``sources``, the addresses of the cameras by name, by ``frames``."""
+        self._frames = frames
         self._changed = threading.Condition()
         self._newest: dict[str, Picture] = {}
         self._names = tuple(sources)
@@ -95,7 +103,7 @@ class CameraReader:
         logged = ""
         while True:
             try:
-                for t, jpeg in frames(address):
+                for t, jpeg in self._frames(address):
                     logged = ""
                     self._put(Picture(name, t, jpeg))
             except KatanaError as error:
@@ -170,8 +178,15 @@ def received_pictures(
 def run_cameras(config: CamerasConfig, supervisor: SupervisorPipe) -> None:
     """Read the cameras in this process until the server ends."""
     lower_priority()
-    reader = CameraReader(config.sources)
+    states = StateReceiver(config.facts)
+
+    def frames_of(source: str) -> Iterator[CameraFrame]:
+        view = source.removeprefix(SIMULATED)
+        return frames(source) if view == source else states.frames(view)
+
+    reader = CameraReader(config.sources, frames_of)
     roles: Roles = {PAGE: reader.send, RECORDER: reader.send, SHARER: reader.take}
+    roles[STATES] = states.take
     listener = PrivateListener(config.address, roles, "the process of the cameras")
     listener.start()
     supervisor.report(READY)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from functools import partial
+from threading import Thread
 from typing import TYPE_CHECKING
 
 from katana450.arm.runtime.pipes.private_listener import PrivateAddress
@@ -33,7 +35,8 @@ def add_serve_options(parser: ArgumentParser) -> None:
         default=[],
         metavar="NAME=SOURCE",
         help="show a camera beside the scene: an http address of MJPEG, `browser` for one that a "
-        "person shares on the page, or with the extra `cameras` a device (0, /dev/video0), an rtsp "
+        "person shares on the page, with the extra `pictures` simulated:wrist or "
+        "simulated:overview, or with the extra `cameras` a device (0, /dev/video0), an rtsp "
         f"address or a film; up to {MAX_CAMERAS}",
     )
     parser.add_argument(
@@ -64,9 +67,14 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
     if len(sources) > MAX_CAMERAS:
         raise ConfigurationError(f"There are {len(sources)} cameras, of at most {MAX_CAMERAS}.")
     from katana450.extensions.cameras.camera_process import CamerasConfig, run_cameras
-    from katana450.extensions.cameras.sources import EXTRA, PURPOSE, needs_extra
+    from katana450.extensions.cameras.simulated import VIEWS
+    from katana450.extensions.cameras.sources import EXTRA, PURPOSE, SIMULATED, needs_extra
     from katana450.extras import require
 
+    for source in sources.values():
+        if source.startswith(SIMULATED) and source.removeprefix(SIMULATED) not in VIEWS:
+            views = " or ".join(SIMULATED + view for view in VIEWS)
+            raise ConfigurationError(f"There is no camera {source}. Take {views}.")
     if any(map(needs_extra, sources.values())):
         require("cv2", EXTRA, PURPOSE)
     # The page's server, which gets the options too, finds the process by it.
@@ -75,7 +83,7 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
         "katana450 cam",
         "The process of the cameras",
         run_cameras,
-        CamerasConfig(sources, options.camera_process),
+        CamerasConfig(sources, options.camera_process, facts),
         f"Cameras: {', '.join(sources)}",
     )
 
@@ -88,7 +96,8 @@ def routes(context: RouteContext) -> list[BaseRoute]:
     from starlette.routing import Route, WebSocketRoute
 
     from katana450.extensions.cameras.camera_link import CameraLink, CameraSockets, SharedCameras
-    from katana450.extensions.cameras.sources import BROWSER
+    from katana450.extensions.cameras.simulated import send_states
+    from katana450.extensions.cameras.sources import BROWSER, SIMULATED
     from katana450.server.api.fields import ROOT
 
     names = [name for name, _ in context.options.camera]
@@ -96,9 +105,14 @@ def routes(context: RouteContext) -> list[BaseRoute]:
     cameras = [{"name": name, "shared": name in shared} for name in names]
     context.hub.shown = {**context.hub.shown, ENTRY: cameras}
     drivers_only = context.options.cameras_for == "drivers"
-    sockets = CameraSockets(
-        CameraLink(address), context.authenticator, names, drivers_only=drivers_only
-    )
+    link = CameraLink(address)
+    if any(source.startswith(SIMULATED) for _, source in context.options.camera):
+        present = context.hub.present
+        states = partial(
+            send_states, address, lambda: present().snapshot.state, lambda: link.is_watched
+        )
+        Thread(target=states, name="states for cameras", daemon=True).start()
+    sockets = CameraSockets(link, context.authenticator, names, drivers_only=drivers_only)
     path = f"{ROOT}/cameras/{{name}}"
     sharing = Route(path, SharedCameras(context, address, shared).take, methods=["POST"])
     return [WebSocketRoute(path, sockets.serve), *([sharing] if shared else [])]

@@ -25,6 +25,9 @@ EXTRA = "cameras"
 PURPOSE = "Cameras of this machine, of RTSP, and films"
 """Cameras that need the extra, as the subject of a sentence."""
 
+SIMULATED = "simulated:"
+"""Beginning of the address of a camera of the simulation, before its view."""
+
 BROWSER = "browser"
 """Address of a camera that a person shares on the page."""
 
@@ -69,7 +72,7 @@ def is_mjpeg(address: str) -> bool:
 
 def needs_extra(address: str) -> bool:
     """Return whether the camera at ``address`` is read by a library of the extra."""
-    return not is_mjpeg(address) and address != BROWSER
+    return not (is_mjpeg(address) or address == BROWSER or address.startswith(SIMULATED))
 
 
 def frames(address: str) -> Iterator[CameraFrame]:

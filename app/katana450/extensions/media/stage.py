@@ -28,7 +28,14 @@ from katana450.arm.robot.visual import Visual
 from katana450.assembly.robot_session import find_robot
 from katana450.caching import cached_property
 from katana450.extensions.conduit import ConduitStretch, poses, ring, stretches_of
-from katana450.extensions.media.picture import Camera, Item, Pixels, Translucent, picture
+from katana450.extensions.media.picture import (
+    Camera,
+    Item,
+    Pixels,
+    Translucent,
+    check_traceable,
+    picture,
+)
 from katana450.extensions.media.wrist_camera import WRIST, WristCamera
 from katana450.extensions.water import WaterPart, parts_of
 from katana450.maths.geometry import so3
@@ -222,15 +229,32 @@ def rendering_pool(shots: Sequence[Shot], urdf: Path, bare: bool, count: int) ->
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-class _Studio(NamedTuple):
-    """The data of a process that renders pictures."""
+class Studio(NamedTuple):
+    """A robot, its stage, and the pictures of it that a process renders."""
 
     shots: tuple[Shot, ...]
     robot: Robot
     stage: RenderStage
 
+    @staticmethod
+    def of(
+        shots: Iterable[tuple[str, tuple[int, int]]],
+        settings: Settings,
+        urdf: Path,
+        tool: str | None,
+    ) -> Studio:
+        """Return the studio of the robot in the file ``urdf``."""
+        check_traceable()
+        robot, session, _ = find_robot(settings, urdf, tool)
+        stage = RenderStage(robot, session, load_props())
+        return Studio(tuple(Shot(*shot) for shot in shots), robot, stage)
 
-_studios: list[_Studio] = []
+    def taken(self, state: State) -> tuple[Pixels, ...]:
+        """Return the picture of each shot. Raises InputError for a wrist without a hand."""
+        return tuple(shot.taken(self.stage, self.robot, state) for shot in self.shots)
+
+
+_studios: list[Studio] = []
 """The only entry is set in processes that render pictures."""
 
 
@@ -239,8 +263,7 @@ def _begin(shots: tuple[Shot, ...], urdf: Path, bare: bool) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Processes of a pool would wait for ever for work of a parent that was killed.
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    robot, session, _ = find_robot(replace(Settings(), bare=bare), urdf, None)
-    _studios.append(_Studio(shots, robot, RenderStage(robot, session, load_props())))
+    _studios.append(Studio.of(shots, replace(Settings(), bare=bare), urdf, None))
 
 
 def _end_with_parent() -> None:
@@ -252,5 +275,4 @@ def _end_with_parent() -> None:
 
 def _take(state: State) -> tuple[Pixels, ...]:
     (studio,) = _studios
-    stage, robot = studio.stage, studio.robot
-    return tuple(shot.taken(stage, robot, state) for shot in studio.shots)
+    return studio.taken(state)
