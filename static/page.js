@@ -18,7 +18,6 @@ import { Store } from "./page/store.js";
 import { named, showToast } from "./page/words.js";
 import { PARAMETER } from "./viser/address.js";
 
-const NOTE_EVERY = 100; // ms, minimum between two notes that this page is used
 const DRAW_EVERY = 200; // ms between two looks at the age of the picture
 const SIGN_IN = 4401; // close code: the page has to sign in again
 const REPEATED = ["heartbeat", "jog", "servo", "query"]; // requests that are sent without a press
@@ -81,12 +80,7 @@ function blur() {
 window.addEventListener("blur", blur);
 
 // A person uses viser's page, which may begin to drive.
-let noted = -Infinity;
-function used() {
-  if (performance.now() - noted < NOTE_EVERY) return;
-  noted = performance.now();
-  send({ used: true });
-}
+const used = () => send({ used: true });
 
 /** The parameters for viser's page, which loads meanwhile; resolved when the person has signed in. @type {(parameters: URLSearchParams) => void} */
 let enterScene = () => {};

@@ -18,7 +18,7 @@ export function leaseControls(status, say) {
   /** @type {HTMLElement[]} */
   const buttons = first
     ? [
-        button(mine ? `Give to ${first.name}` : "Allow", () => say({ do: "give", to: first.number }), { ...MAIN, title: first.name }),
+        button(mine ? "Give" : "Allow", () => say({ do: "give", to: first.number }), { ...MAIN, title: first.name }),
         button("Refuse", () => say({ do: "decline", to: first.number })),
       ]
     : [];

@@ -1,5 +1,6 @@
 // The parts of the page that are loaded when they are first used.
 import { element, onClick } from "../dom.js";
+import { NARROW } from "../viser/names.js";
 
 const OPEN = "katana450.instruments.open";
 const WELCOMED = "katana450.welcome";
@@ -49,13 +50,13 @@ export class Parts {
       this.#showWelcome();
     });
     const instruments = element("instruments-button", HTMLButtonElement);
-    onClick("instruments-button", () => this.#showInstruments(instruments.ariaExpanded !== "true"));
+    onClick("instruments-button", () => this.showInstruments(instruments.ariaExpanded !== "true"));
   }
 
   // Show what was open when the person was here last, now that they have signed in.
   begin() {
     const { kept, store } = this.#page;
-    if (kept.getItem(OPEN) === "yes") this.#showInstruments(true);
+    if (kept.getItem(OPEN) === "yes") this.showInstruments(true);
     let isFirst = true;
     store.follow(async ({ role }) => {
       if (!isFirst) return;
@@ -118,11 +119,13 @@ export class Parts {
   }
 
   /** @param {boolean} shown */
-  async #showInstruments(shown) {
+  async showInstruments(shown) {
     const { say, kept } = this.#page;
     const button = element("instruments-button", HTMLButtonElement);
     button.ariaExpanded = String(shown);
     kept.setItem(OPEN, shown ? "yes" : "no");
+    // On a phone there is no room for both.
+    if (shown && matchMedia(NARROW).matches) window.katana?.closeSheets();
     if (shown && !this.panel) {
       const { Panel } = await import("../instruments/panel.js");
       this.panel ??= new Panel(element("instruments", HTMLElement), { say, watch: this.#watch, kept, quietly: QUIETLY });

@@ -6,8 +6,12 @@ const box = element("toast", HTMLElement);
 /** @type {number | undefined} */
 let timer;
 
-/** Return a time of the day as the browser's locale writes it. @param {Date} time @param {Intl.DateTimeFormatOptions} [style] */
-export const clock = (time, style) => time.toLocaleTimeString([], style);
+// The browser's locale, or the language of the page where another one was chosen.
+const { lang } = document.documentElement;
+export const locale = navigator.language.startsWith(lang) ? navigator.language : lang;
+
+/** Return a time of the day as the locale writes it. @param {Date} time @param {Intl.DateTimeFormatOptions} [style] */
+export const clock = (time, style) => time.toLocaleTimeString(locale, style);
 
 /** Return `words` for the person `name`, who is "You" where they begin with what that one did. @param {string} words @param {string} name */
 export const addressed = (words, name) =>

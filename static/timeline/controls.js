@@ -1,7 +1,7 @@
 // The elements of the timeline: its track, its buttons and its lists.
 import { element, t, write } from "../dom.js";
 import { button, drawing, html, svg } from "../instruments/shape.js";
-import { clock } from "../page/words.js";
+import { clock, locale } from "../page/words.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const EXPORTS = [["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["mp4", "MP4 film"]];
@@ -40,7 +40,7 @@ export class Controls {
   pastWords = html("span", {}, "Shown as it was at ");
   legend = html("p", { class: "legend" }, ...Object.entries(KINDS).map(([kind, words]) => html("span", { "data-kind": kind }, html("i", { class: kind }), words)));
   #note = html("p", { role: "status" });
-  #words = [this.pastWords, this.moment, html("span", {}, ", arm is elsewhere")];
+  #words = [this.pastWords, this.moment, html("span", {}, ", the arm is now elsewhere")];
   past = html("div", { id: "past", hidden: "" });
 
   /** @param {HTMLElement} box @param {Acts} acts */
@@ -91,5 +91,5 @@ export function timeInWords(t) {
   const style = { hour: "2-digit", minute: "2-digit", second: "2-digit" };
   const time = new Date(1000 * t);
   const today = time.toDateString() === new Date().toDateString();
-  return today ? clock(time, style) : time.toLocaleString([], { day: "numeric", month: "short", ...style });
+  return today ? clock(time, style) : time.toLocaleString(locale, { day: "numeric", month: "short", ...style });
 }

@@ -2,7 +2,7 @@
 import { element, repeating, sceneOf, write } from "../dom.js";
 import { button, html } from "../instruments/shape.js";
 import { armWithStyle } from "../page/ready.js";
-import { messageOf, readState, request } from "../server.js";
+import { messageOf, request } from "../server.js";
 import { ScriptRun } from "../teach/run.js";
 
 const KEPT = "katana450.welcome"; // in the browser's storage, once the card was dismissed
@@ -11,10 +11,9 @@ const SCRIPTS = "api/v1/scripts/";
 const PULSE_EVERY = 50; // ms
 const ID = "pour"; // id of the requests of the program
 const POUR = { name: "Pour", title: "Watch it pour", about: "The arm grasps the cup and empties it", did: "Poured. The cup is back in its place.", not: "It did not pour." };
-const WAVE = { name: "Wave", title: "Watch it move", about: "A program turns one joint to and fro", did: "Done. That was a program of three steps.", not: "It did not move." };
-const CIRCLE = { name: "Small circle", title: "Watch it move", about: "The arm draws a circle in the air", did: "Done. That was a program of four steps.", not: "It did not move." };
-const SWING = 20; // degrees to either side, at most
-const RADIANS = Math.PI / 180;
+const WAVE = { name: "Wave", title: "Watch it move", about: "A program turns one joint to and fro", did: "Done. That was a program of {} steps.", not: "It did not move." };
+const CIRCLE = { name: "Small circle", title: "Watch it move", about: "The arm draws a circle in the air", did: "Done. That was a program of {} steps.", not: "It did not move." };
+const TO_AND_FRO = `name: ${WAVE.name}\nsteps:\n  - nudge: {axis: 1, by: 20}\n  - nudge: {axis: 1, by: -20}\n`; // degrees or mm
 const HANDLE = "/target/move";
 
 export class Welcome {
@@ -134,7 +133,7 @@ export class Welcome {
       const program = began ? await this.#run.follow() : await this.#run.play(await this.#script(), "run", revocations);
       if (program.status !== "done") throw new Error(program.why || program.status);
       this.#done(name);
-      write(this.#says, did);
+      write(this.#says, did.replace("{}", String(program.steps)));
     } catch (error) {
       write(this.#says, `${not} ${messageOf(error)}`);
       const { paused, stopped } = this.#page.store.status ?? {};
@@ -144,20 +143,7 @@ export class Welcome {
 
   // Return the text of the program.
   async #script() {
-    if (this.#program === WAVE) return this.#wave((await readState())?.q ?? []);
-    return (await request(SCRIPTS + this.#program?.name)).text();
-  }
-
-  /** Turn the first joint that can turn to both sides of the posture q. @param {number[]} q */
-  #wave(q) {
-    const { lower, upper, slides } = this.#arm;
-    const room = q.map((angle, i) => (slides[i] ? 0 : Math.min(SWING, (upper[i] - angle) / RADIANS - 1, (angle - lower[i]) / RADIANS - 1)));
-    const axis = room.findIndex((angle) => angle >= 5);
-    if (axis < 0) throw new Error("No joint has room to turn. Press Home first.");
-    /** @param {number} angle */
-    const by = (angle) => `  - nudge: {axis: ${axis + 1}, by: ${angle}}\n`;
-    const angle = Math.floor(room[axis]);
-    return `name: ${WAVE.name}\nsteps:\n${by(angle)}${by(-2 * angle)}${by(angle)}`;
+    return this.#program === WAVE ? TO_AND_FRO : (await request(SCRIPTS + this.#program?.name)).text();
   }
 
   /** Take an answer; return whether it was for the card. @param {Page.Answer} answer */

@@ -155,7 +155,7 @@ def test_bar_keeps_its_height_and_the_reason_its_room(
     ):
         look("others")
         ben.ask(requests.Ask())
-        page.page.get_by_role("button", name="Give to Ben").wait_for()
+        page.page.get_by_role("button", name="Give", exact=True).wait_for()
         look("asked")
         page.press_in_bar("STOP")
         truth.wait(mood="stopped")

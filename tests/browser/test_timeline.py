@@ -171,7 +171,7 @@ def test_past_is_shown_in_one_window_until_stop(
         lambda: abs(shown_turn(page) - begin.row.joints[0]) < 1e-6, "the first recorded posture"
     )
     assert not page.shows("/target/move"), "the gizmo of the present can be dragged"
-    page.page.get_by_text("arm is elsewhere").wait_for()
+    page.page.get_by_text("arm is now elsewhere").wait_for()
     assert "Live" not in (slider.get_attribute("aria-valuetext") or "Live")
     page.keep(artefacts / "timeline.png")
 

@@ -61,7 +61,7 @@ ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
 
 INVALID: dict[Format, list[tuple[bytes | str, str]]] = {
     Format.STL: [
-        (b"", "not an STL file"),
+        (b"", "too short for an STL file"),
         (stl(0), "declares 0 triangles"),
         (stl()[:-1], "declares 1 triangles, which take 134 bytes, but has 133"),
         (stl(2**31), "declares 2147483648 triangles"),

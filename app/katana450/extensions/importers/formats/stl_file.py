@@ -45,6 +45,10 @@ def read_stl(data: bytes, name: str) -> MeshReading:
         except ValueError as error:
             reason = str(error)[:80]
             raise InputError(f"{name} has coordinates that are not numbers: {reason}.") from error
+    elif len(data) < HEADER:
+        raise InputError(
+            f"{name} is too short for an STL file: it has {len(data)} bytes of at least {HEADER}."
+        )
     else:
         raise InputError(
             f"{name} is corrupt or not an STL file: it is no text of a 'solid', and it declares "
