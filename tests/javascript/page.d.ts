@@ -34,7 +34,7 @@ declare namespace Page {
     mood: string; headline: string; why: string; end: string;
     stop: string | null; stopped: string | null; stopped_at: number | null;
     wait: string; problem: string | null; holder: string | null; silence_profile: string;
-    speed: number; paused: boolean; arm: ArmStatus | null; participants: number; revocations: number; scripts: boolean;
+    speed: number; step_speed: boolean; paused: boolean; arm: ArmStatus | null; participants: number; revocations: number; scripts: boolean;
     pace: string; may_clear_stop: boolean; until: string; name: string; role: string; mine: boolean;
     own_program: boolean; asked: boolean; asking: Named[]; others: Named[]; planning: boolean;
     fraction: number; orders: (Api.ProgramOrder | "keep")[]; driven_since?: number; continues: [] | [string, number, number]; age: number;

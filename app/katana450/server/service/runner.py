@@ -72,6 +72,11 @@ class Runner(RequestHandler):
         """True while a run drives the arm."""
         return False
 
+    @property
+    def sets_speed(self) -> bool:
+        """True while the speed is that of a step, in place of what a person has chosen."""
+        return False
+
     def owns(self, participant: Participant) -> bool:  # noqa: ARG002
         """Return whether ``participant`` owns the present or last run, or its planning."""
         return False

@@ -11,9 +11,10 @@ import numpy as np
 from katana450.arm.control.lease import Person
 from katana450.arm.control.session.supervision import tracking_error
 from katana450.arm.control.state.arm_report import ArmMode, ArmReport
-from katana450.arm.control.state.messages import headline, mood, part, sentence
+from katana450.arm.control.state.messages import headline, mood, overlap_text, part, sentence
 from katana450.arm.control.state.state import State, Status
 from katana450.arm.runtime.pipes.stop_messages import NO_STATE
+from katana450.maths.collision.clearance import DEPTH_ROUNDING
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant, addressed
 from katana450.server.service.runner import StatusLine
@@ -65,6 +66,10 @@ def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:
     now = StatusLine("starting", "Starting", "")
     if state is not None:
         now = StatusLine(mood(state), headline(state), sentence(state))
+        nearest = hub.arm.nearest if hub.arm is not None and state.status is Status.OK else None
+        if nearest is not None and nearest.distance < -DEPTH_ROUNDING:
+            link, name = nearest.parts
+            now = StatusLine("limited", "Overlap", overlap_text(name, link, nearest.distance))
         rests = not (state.moving or state.paused or hub.runner.running)
         if hub.arm is not None and hub.arm.busy and rests:
             now = StatusLine("planning", "Planning a path", "The arm then follows it.")
@@ -148,6 +153,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "holder": None if holder is None else holder.name,
         "silence_profile": "" if hub.arm is None else hub.arm.profile.value,
         "speed": 1.0 if state is None else state.speed,
+        "step_speed": hub.runner.sets_speed,
         "paused": state is not None and state.paused,
         "arm": None if state is None or state.report is None else arm_status(state, state.report),
         "clearance": clearance(hub),

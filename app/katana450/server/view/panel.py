@@ -17,6 +17,7 @@ from katana450.arm.control.state.state import State
 from katana450.arm.robot.arm_reader import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
@@ -308,7 +309,11 @@ class PoseForm:
         return next(priority for priority, (name, _) in self._priorities.items() if name == chosen)
 
     def _chosen(self) -> PoseDisplay:
-        return PoseDisplay(self._frame.value, self._arm.T_base_shoulder)
+        arm = self._arm
+        if not arm.kinematics.is_pitched:
+            return PoseDisplay(self._frame.value, arm.T_base_shoulder)
+        R_roll_tool = arm_of(arm.chain).T_K_tool[:3, :3]
+        return PoseDisplay(self._frame.value, arm.T_base_shoulder, R_roll_tool)
 
     # These callbacks are coroutines, because viser calls only those in the order of the messages.
 

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from katana450.arm.control.arm import JointSet
-from katana450.arm.control.state.messages import axis_names, limit_text, signed
+from katana450.arm.control.state.messages import axis_names, limit_text, part, signed
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.arm_reader import MountedArm
 from katana450.maths.geometry import se3, so3
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import limit_distances, nearest_limit
 from katana450.resources import STATIC
@@ -40,7 +40,7 @@ def page(arm: MountedArm, state: State, display: PoseDisplay) -> str:
     limit = limit_text(nearest, axis_names(chain.names)[nearest], float(distances[nearest]))
     return (
         "<div class='k450'><table class='pose'><thead><tr>"
-        f"<th>{escape(state.tool)} in {display.frame_name}</th>"
+        f"<th>{escape(part(state.tool))} in {display.frame_name}</th>"
         f"<th>now</th><th>goal</th><th></th></tr></thead><tbody>{rows}</tbody></table>"
         "<table class='at-once'><tr><th>nearest limit</th>"
         f"<td data-now='limit'>{escape(limit)}</td></tr></table></div>"
@@ -83,10 +83,13 @@ class PoseDisplay(NamedTuple):
     Attributes:
         frame: BASE or SHOULDER.
         T_base_shoulder: (4, 4) the frame {S} in the base frame [m].
+        R_roll_tool: (3, 3) the tool in a frame whose x axis is the roll axis of five axes: its
+            pitch is that of the instruments.
     """
 
     frame: str
     T_base_shoulder: FloatArray
+    R_roll_tool: FloatArray = frozen(np.eye(3))
 
     @property
     def frame_name(self) -> str:
@@ -96,10 +99,11 @@ class PoseDisplay(NamedTuple):
     def numbers(self, T: FloatArray) -> tuple[list[float], list[float]]:
         """Return position [mm] and roll, pitch, yaw [deg] of ``T`` (4, 4) in {S}."""
         shown = self.T_base_shoulder @ T if self.frame == BASE else T
-        return (1e3 * shown[:3, 3]).tolist(), [*map(math.degrees, so3.to_rpy(shown[:3, :3]))]
+        angles = so3.to_rpy(shown[:3, :3] @ self.R_roll_tool.T)
+        return (1e3 * shown[:3, 3]).tolist(), [*map(math.degrees, angles)]
 
     def pose(self, position: Sequence[float], angles: Sequence[float]) -> FloatArray:
         """Return the pose (4, 4) in {S} of a position [mm] and roll, pitch, yaw [deg]."""
-        R = so3.from_rpy(*map(math.radians, angles))
+        R = so3.from_rpy(*map(math.radians, angles)) @ self.R_roll_tool
         T = se3.from_rotation_translation(R, 1e-3 * np.array(position))
         return se3.inverse(self.T_base_shoulder) @ T if self.frame == BASE else T

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from katana450.arm.control.arm import GripperModel
-from katana450.arm.control.state.messages import part, short
+from katana450.arm.control.state.messages import overlap_text
 from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Zone
 from katana450.caching import cached_property
 from katana450.maths.collision.clearance import DEPTH_ROUNDING, MIN_CLEARANCE
@@ -155,8 +155,7 @@ class Environment:
         contact = self._world.deepest(x, obstacle_of(item), "table")
         if contact is None or contact.distance > -DEPTH_ROUNDING:
             return ""
-        link, depth = part(contact.parts[0]), short(-1e3 * contact.distance)
-        return f"{item.name} overlaps the {link} by {depth} mm: move it, or undo."
+        return overlap_text(item.name, contact.parts[0], contact.distance)
 
     def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
         """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m].

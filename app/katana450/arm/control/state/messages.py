@@ -112,7 +112,7 @@ def _in_hand(finding: Finding, fingers: str, cup: str) -> str:
 
 REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.STOPPED: lambda f: f"stopped{_within(f)}: press Clear stop, then give a new target",
-    Reason.PAUSED: lambda _: "paused: press Resume to continue",
+    Reason.PAUSED: lambda _: "press Resume to continue",
     Reason.CONTACT: _contact,
     Reason.ACROSS_GAP: lambda f: (
         f"{axis(f.axis)} would have to leap {short(math.degrees(f.amount))}° to follow: "
@@ -296,6 +296,11 @@ def _reason(state: State, finding: Finding) -> str:
     if finding.reason is Reason.NOT_FOLLOWING and state.report is not None and state.report.note:
         return state.report.note.removesuffix(".")
     return REASONS[finding.reason](finding)
+
+
+def overlap_text(name: str, link: str, distance: float) -> str:
+    """Return a sentence on an object in which a link stands ``-distance`` [m] deep."""
+    return f"{name} overlaps the {part(link)} by {short(-1e3 * distance)} mm: move it, or undo."
 
 
 def finding_text(finding: Finding) -> str:

@@ -167,6 +167,11 @@ class ProgramParticipant:
         """True while the program holds the lease."""
         return self._hub.lease.holder == self.joined.person
 
+    @property
+    def sets_speed(self) -> bool:
+        """True while the speed is another one than a person has chosen."""
+        return self._commanded != self._speed
+
     def follow(self, state: State, t: float) -> None:
         """Keep a speed that a person has set, and end a pause for which only the server was late.
 

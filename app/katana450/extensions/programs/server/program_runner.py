@@ -25,11 +25,7 @@ from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.run.situation import Situation
 from katana450.extensions.programs.server import page_state
-from katana450.extensions.programs.server.page_state import (
-    RunNews,
-    planned_steps,
-    steps_of,
-)
+from katana450.extensions.programs.server.page_state import RunNews, planned_steps, steps_of
 from katana450.extensions.programs.server.program_participant import (
     FollowRun,
     LeftTool,
@@ -90,6 +86,11 @@ class ProgramRunner(Runner):
     def running(self) -> bool:
         """True while a program holds the arm."""
         return self._runs_as is not None
+
+    @property
+    def sets_speed(self) -> bool:
+        """True while a step has set the speed."""
+        return self._runs_as is not None and self._runs_as.sets_speed
 
     @property
     def program(self) -> Program | None:
