@@ -68,8 +68,7 @@ def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:
         now = StatusLine(mood(state), headline(state), sentence(state))
         nearest = hub.arm.nearest if hub.arm is not None and state.status is Status.OK else None
         if nearest is not None and nearest.distance < -DEPTH_ROUNDING:
-            link, name = nearest.parts
-            now = StatusLine("limited", "Overlap", overlap_text(name, link, nearest.distance))
+            now = StatusLine("limited", "Overlap", overlap_text(*nearest.parts, nearest.distance))
         rests = not (state.moving or state.paused or hub.runner.running)
         if hub.arm is not None and hub.arm.busy and rests:
             now = StatusLine("planning", "Planning a path", "The arm then follows it.")

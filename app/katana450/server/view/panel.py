@@ -8,6 +8,7 @@ from html import escape
 from operator import is_
 from typing import Any
 
+import numpy as np
 import viser
 
 from katana450.arm.control.commands import commands as cmd
@@ -310,10 +311,8 @@ class PoseForm:
 
     def _chosen(self) -> PoseDisplay:
         arm = self._arm
-        if not arm.kinematics.is_pitched:
-            return PoseDisplay(self._frame.value, arm.T_base_shoulder)
-        R_roll_tool = arm_of(arm.chain).T_K_tool[:3, :3]
-        return PoseDisplay(self._frame.value, arm.T_base_shoulder, R_roll_tool)
+        T = arm_of(arm.chain).T_K_tool if arm.kinematics.is_pitched else np.eye(4)
+        return PoseDisplay(self._frame.value, arm.T_base_shoulder, T[:3, :3])
 
     # These callbacks are coroutines, because viser calls only those in the order of the messages.
 

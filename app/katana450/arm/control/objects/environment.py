@@ -155,7 +155,7 @@ class Environment:
         contact = self._world.deepest(x, obstacle_of(item), "table")
         if contact is None or contact.distance > -DEPTH_ROUNDING:
             return ""
-        return overlap_text(item.name, contact.parts[0], contact.distance)
+        return overlap_text(contact.parts[0], item.name, contact.distance)
 
     def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
         """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m].

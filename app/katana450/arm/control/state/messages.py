@@ -298,8 +298,8 @@ def _reason(state: State, finding: Finding) -> str:
     return REASONS[finding.reason](finding)
 
 
-def overlap_text(name: str, link: str, distance: float) -> str:
-    """Return a sentence on an object in which a link stands ``-distance`` [m] deep."""
+def overlap_text(link: str, name: str, distance: float) -> str:
+    """Return a sentence on a link that stands ``-distance`` [m] deep in the object ``name``."""
     return f"{name} overlaps the {part(link)} by {short(-1e3 * distance)} mm: move it, or undo."
 
 
