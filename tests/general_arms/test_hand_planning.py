@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from katana450.extensions.programs.building.plan_state import PlanState
-from katana450.extensions.programs.planning.hand_frames import ArmPlane
+from katana450.extensions.programs.planning.hand_frames import ArmPlane, GraspFrame
 from katana450.extensions.programs.planning.hand_planning import HandPlanning
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.kinematics.chain import Chain
@@ -22,7 +22,7 @@ from tests.general_arms.published_arms import OPENMANIPULATOR_X, PANDA, UR5E
 def hand(chain: Chain) -> HandPlanning:
     """Return the hand of an arm whose tool frame is its grasp frame."""
     plan_state: PlanState = begin_plan(chain)
-    return HandPlanning(plan_state.planning, np.eye(4), np.eye(4), 0.1, one_jaw=False, plane=None)
+    return HandPlanning(plan_state.planning, np.eye(4), np.eye(4), GraspFrame(np.eye(4), 0.1), None)
 
 
 @pytest.mark.parametrize(("chain", "turn"), [(UR5E, 6.0 - math.tau), (PANDA, 6.0)])

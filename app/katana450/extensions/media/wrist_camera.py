@@ -14,7 +14,7 @@ from katana450.extensions.hands.sides import PlacedBodies, sides_of
 from katana450.extensions.media.picture import Camera
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.view.cameras import outward
+from katana450.server.view.cameras import outward, triple
 
 WRIST = "wrist"
 """Name of the view."""
@@ -50,7 +50,7 @@ class WristCamera:
         else:
             T = _palm(self._session, state.x) @ self._T_palm_camera
         p, forward, up = T[:3, 3], T[:3, 2], -T[:3, 1]
-        return Camera(_triple(p), _triple(p + forward), FOV, size, _triple(up))
+        return Camera(triple(p), triple(p + forward), FOV, size, triple(up))
 
 
 def beside_hand(robot: Robot, session: Session) -> FloatArray:
@@ -97,8 +97,3 @@ def _palm(session: Session, x: FloatArray) -> FloatArray:
     assert hand is not None
     assert world is not None
     return np.asarray(world.linkage.poses(x)[hand.palm])
-
-
-def _triple(p: FloatArray) -> tuple[float, float, float]:
-    x, y, z = p.tolist()
-    return x, y, z

@@ -105,7 +105,7 @@ def camera_pose(preset: Preset, robot: Robot, state: State) -> CameraPose:
     up = up / size if size > MIN_UP_SINE else -T[:3, 2 if abs(out[2]) < ALONG else 1]
     scale = scale_of(robot)
     behind, above, distance = scale * BEHIND, scale * ABOVE, scale * AHEAD
-    return CameraPose(_triple(p - behind * x + above * up), _triple(p + distance * x))
+    return CameraPose(triple(p - behind * x + above * up), triple(p + distance * x))
 
 
 def outward(chain: Chain) -> FloatArray:
@@ -129,7 +129,7 @@ def fixed_pose(preset: Preset, robot: Robot) -> CameraPose:
         return look
     corners = np.array(list(itertools.product(*np.transpose(robot.bounds).tolist())))
     whole = fitted(corners, np.subtract(look.target, look.position))
-    return CameraPose(_triple(whole.eye), _triple(whole.target))
+    return CameraPose(triple(whole.eye), triple(whole.target))
 
 
 def initial_camera(robot: Robot) -> InitialCamera | None:
@@ -178,6 +178,7 @@ def _turn(client: viser.ClientHandle, look: CameraPose) -> None:
         client.camera.look_at = look.target
 
 
-def _triple(p: FloatArray) -> tuple[float, float, float]:
+def triple(p: FloatArray) -> tuple[float, float, float]:
+    """Return the three numbers of ``p`` (3,)."""
     x, y, z = p.tolist()
     return x, y, z

@@ -110,9 +110,9 @@ class Panel:
             self._gui.add_html(f"<div class='k450'>{why}</div>")
         self._sliders = [self._joint(axis, state, listen) for axis in range(len(self._labels))]
         fingers = self._model.gripper
-        has_fingers = fingers.moves and not fingers.is_cup
-        self._gripper = self._finger(state, listen) if has_fingers else None
         self._suction = self._cup(state, listen) if fingers.is_cup else None
+        has_fingers = fingers.moves and self._suction is None
+        self._gripper = self._finger(state, listen) if has_fingers else None
         drive = self._gui.add_button_group(
             "Drive",
             tuple(GESTURES),

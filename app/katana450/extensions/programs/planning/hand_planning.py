@@ -111,21 +111,17 @@ class HandPlanning:
         planning: that of the tool.
         T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
         T_tool_grasp: (4, 4) pose of the grasp frame in that of the tool [m].
-        opening: distance between the open fingers [m].
-        one_jaw: whether one jaw closes against a fixed one.
+        frame: where its fingers meet; a suction cup takes objects from above at their tops.
         plane: that of an arm with fewer than six axes; None for others.
         tool: name of the tool frame that grasps; "" for every one.
-        is_cup: whether it is a suction cup, which takes objects from above at their tops.
     """
 
     planning: ToolPlanning
     T_base_shoulder: FloatArray
     T_tool_grasp: FloatArray
-    opening: float
-    one_jaw: bool
+    frame: GraspFrame
     plane: ArmPlane | None
     tool: str = ""
-    is_cup: bool = False
 
     @property
     def tip_distances(self) -> Sequence[float]:
@@ -170,11 +166,11 @@ class HandPlanning:
     ) -> Mapping[str, Sequence[Approach]]:
         """Return all approaches between whose fingers the object fits, or raise InputError."""
         options: Widths = widths(pitches, scene_object, place, side)
-        if self.is_cup:
+        if self.frame.is_cup:
             options = {ABOVE: options.get(ABOVE, ())}
         if self.plane is not None:
             options = self._in_plane(self.plane, options)
-        return fitting(options, self.opening, one_jaw=self.one_jaw)
+        return fitting(options, self.frame.opening, one_jaw=self.frame.one_jaw)
 
     def _in_plane(self, plane: ArmPlane, options: Widths) -> Widths:
         """Return those options whose direction and, with four axes, roll follow from the arm."""
@@ -192,7 +188,7 @@ class HandPlanning:
                 "its sides are turned too far, seen from the arm, and four axes cannot turn the "
                 f"hand: at most {math.degrees(MAX_SKEW):.0f} deg are possible. Turn it."
             )
-        if plane.rolls and self.one_jaw:
+        if plane.rolls and self.frame.one_jaw:
             # The fixed jaw may be on either side.
             possible[FRONT] = [
                 (approach._replace(roll=roll), width)
@@ -220,7 +216,7 @@ class HandPlanning:
         grasp frame, so that this jaw leaves the object.
         """
         target, (x, y, _) = self.planning.at(q), self._R(q).T
-        aside = JAW_ROOM if self.one_jaw else 0.0
+        aside = JAW_ROOM if self.frame.one_jaw else 0.0
         return target.moved(frozen(target.position - away * x - aside * y))
 
     def branches_to(self, q: FloatArray, target: ToolTarget) -> Sequence[AnyBranch | None]:
@@ -402,15 +398,8 @@ def hand_of(session: Session, T_base_shoulder: FloatArray, state: State) -> Hand
     in_family, chain = planning.is_pitched, planning.chain
     if in_family and GRASP in arm.tools:
         in_front = ArmPlane.of(chain, np.eye(4), session.ready)
-        return HandPlanning(
-            planning,
-            T_base_shoulder,
-            np.eye(4),
-            math.inf,
-            one_jaw=False,
-            plane=in_front,
-            tool=GRASP,
-        )
+        frame = GraspFrame(np.eye(4), math.inf)
+        return HandPlanning(planning, T_base_shoulder, np.eye(4), frame, in_front, GRASP)
     if not in_family and axes < FREE_AXES and axes != PLANAR_AXES:
         raise InputError(
             f"An arm with {axes} axes outside the five-axis family cannot keep an object upright. "
@@ -418,19 +407,11 @@ def hand_of(session: Session, T_base_shoulder: FloatArray, state: State) -> Hand
             "family."
         )
     hand = environment.hand
-    frame: GraspFrame = grasp_frame(environment.world(()), hand, arm.gripper)
+    frame = grasp_frame(environment.world(()), hand, arm.gripper)
     assert hand is not None
     T_palm_tool = (
         hand.T_palm_tool @ se3.inverse(arm.tools[arm.default_tool]) @ arm.tools[state.tool]
     )
     T_tool_grasp = frozen(se3.inverse(T_palm_tool) @ frame.T_palm_grasp)
     plane = ArmPlane.of(chain, T_tool_grasp, session.ready) if axes < FREE_AXES else None
-    return HandPlanning(
-        planning,
-        T_base_shoulder,
-        T_tool_grasp,
-        frame.opening,
-        frame.one_jaw,
-        plane,
-        is_cup=frame.is_cup,
-    )
+    return HandPlanning(planning, T_base_shoulder, T_tool_grasp, frame, plane)

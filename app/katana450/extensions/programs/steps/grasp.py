@@ -109,7 +109,7 @@ class Grasp(Step, word="grasp", example="cup"):
                 "may take it."
             )
         hand = plan.hand
-        if not hand.is_cup and self.height is None and scene_object.height < MIN_HEIGHT:
+        if not hand.frame.is_cup and self.height is None and scene_object.height < MIN_HEIGHT:
             raise InputError(
                 f"{self.name} is {1e3 * scene_object.height:.1f} mm high, and the minimum is "
                 f"{1e3 * MIN_HEIGHT:.0f} mm: the fingertips stay {1e3 * MARGIN:.0f} mm over what "
@@ -186,7 +186,7 @@ class Grasp(Step, word="grasp", example="cup"):
 
     def _grips(self, plan: PlanState, scene_object: SceneObject, approach: Approach) -> list[Grip]:
         """Return the places of the grasp on the object, the best first."""
-        if self.height is not None or plan.hand.is_cup:
+        if self.height is not None or plan.hand.frame.is_cup:
             return [Grip(scene_object.height if self.height is None else self.height)]
         fractions = HEIGHT_FRACTIONS[ABOVE if approach.pitch == DOWN else FRONT]
         grips = [Grip(fraction * scene_object.height) for fraction in fractions]
