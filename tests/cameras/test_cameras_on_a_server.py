@@ -120,7 +120,7 @@ def test_picture_that_a_page_shares_is_shown_with_its_age(server: AppServer) -> 
         ("page=a&age=0", b"GIF", "mine", 422),
         ("page=a&age=11", picture(3), "mine", 422),
         ("page=a&age=x", picture(3), "mine", 422),
-        ("page=a&age=0", bytes(5_000_000), "mine", 413),
+        ("page=a&age=0", bytes(1_000_001), "mine", 413),
         ("page=a&age=0", picture(3), "table", 404),
     ):
         assert share(server, query, jpeg, camera_name)[0] == code

@@ -28,7 +28,7 @@ from katana450.extensions.cameras.camera_process import (
     Picture,
     received_pictures,
 )
-from katana450.extensions.cameras.sources import JPEG, MAX_FRAME_BYTES
+from katana450.extensions.cameras.sources import JPEG
 from katana450.server.web.admission import client_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, TOKEN_REQUIRED, Authenticator
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, body_of
@@ -120,8 +120,8 @@ class CameraSharer:
                 raise
 
 
-MAX_AGE = 10.0
-"""[s] Maximum age of a picture that is shared."""
+MAX_AGE, MAX_SHARED_BYTES = 10.0, 1_000_000
+"""[s, bytes] Maximum age and size of a picture that is shared. Many may wait for the recording."""
 
 
 SILENCE = 2.0
@@ -149,7 +149,7 @@ class SharedCameras:
         sharing, last = self._sharing[name]
         if sharing != page and time.perf_counter() - last < SILENCE:
             raise HTTPException(NOT_NOW, f"Another window shares the camera {name} already.")
-        jpeg = await body_of(request, MAX_FRAME_BYTES)
+        jpeg = await body_of(request, MAX_SHARED_BYTES)
         try:
             age = float(request.query_params.get("age", ""))
         except ValueError:
