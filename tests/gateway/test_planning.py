@@ -311,7 +311,7 @@ def test_speed_set_by_a_person_lasts_until_the_program_ends(table: Staged) -> No
     assert table.arm.fraction == 0.3
 
 
-@pytest.mark.parametrize("ends", ["done", "ended", "STOP"])
+@pytest.mark.parametrize("ends", ["done", "ended", "STOP", "continued"])
 def test_tool_frame_is_restored_at_every_end_of_a_program(table: Staged, ends: str) -> None:
     participant, before = table.join(PAGES[0]), table.arm.state.tool
     table.run(participant, "steps:\n  - tool: flange\n  - wait: 1\n")
@@ -319,13 +319,15 @@ def test_tool_frame_is_restored_at_every_end_of_a_program(table: Staged, ends: s
     table.arm.rest = replace(table.arm.rest, tool="flange")
     if ends == "ended":
         table.programs.steer(participant, ProgramOrder.END)
-    elif ends == "STOP":
+    elif ends in {"STOP", "continued"}:
         table.stop("Anybody")
         table.wait(0.2, participant)
         # Nothing is selected before the stop is cleared.
         assert [command for command in table.arm.commands if command == cmd.Tool(before)] == []
         table.hub.move(participant, cmd.ClearStop())
+        if ends == "continued":
+            table.programs.steer(participant, ProgramOrder.CONTINUE)
     table.wait(3.0, participant)
-    assert table.status == ("done" if ends == "done" else "stopped")
+    assert table.status == ("done" if ends in {"done", "continued"} else "stopped")
     chosen = [command.name for command in table.arm.commands if isinstance(command, cmd.Tool)]
-    assert chosen == ["flange", before]
+    assert chosen == ["flange", *(["flange"] if ends == "continued" else []), before]

@@ -128,14 +128,16 @@ class ProgramParticipant:
         name: str,
         owner: Participant,
         follow_run: Callable[[float, float | None], None],
+        left_tool: LeftTool | None = None,
         *,
         holds: bool = True,
     ) -> None:
         """Join ``hub`` as the program ``name`` of ``owner``, and take the lease.
 
         ``follow_run`` is called with the time at which the run begins [s] and None, and at its end
-        with both times. ``holds``: whether the arm stops first. Raises LeaseError if another
-        participant holds the lease, or the arm is stopped.
+        with both times. ``left_tool`` is what an earlier run has not restored. ``holds``: whether
+        the arm stops first. Raises LeaseError if another participant holds the lease, or the arm is
+        stopped.
         """
         self._hub, self._owner = hub, owner
         identity, alive = program_identity(name, owner.person), AlwaysAlive(hub.clock)
@@ -156,7 +158,7 @@ class ProgramParticipant:
         hub.gate.program = RunningProgram(joined.person, owner.person.key)
         # The speed to restore at the end, and the last one that was commanded.
         self._speed = self._commanded = hub.present().state.speed
-        self._tool = hub.present().state.tool
+        self._tool = left_tool.tool if left_tool is not None else hub.present().state.tool
         self.allowed = 1.0
         self._pause_seen: float | None = None
         self._began, self._follow_run = hub.clock(), follow_run

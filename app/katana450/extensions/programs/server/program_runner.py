@@ -232,7 +232,8 @@ class ProgramRunner(Runner):
         if self._looked[2] not in (None, *hub.participants):
             self._looked = None, 0.0, None
             self.show_preview()
-        if self._left_tool is not None:
+        # A run that is being planned begins in the frame of now, and restores it at its end.
+        if self._left_tool is not None and not self.planner.will_run:
             self._left_tool = self._left_tool.restored(hub)
         if self.program is not None and self.waits:
             self._start_planned()
@@ -463,7 +464,7 @@ class ProgramRunner(Runner):
         program, began = planning.program, self.hub.clock()
         follow = partial(self.follow_run, program.name, planning.text)
         self._runs_as = ProgramParticipant(
-            self.hub, program.name, participant, follow, holds=reached is None
+            self.hub, program.name, participant, follow, self._left_tool, holds=reached is None
         )
         self._owner.change_to(participant, began)
         self._interruption = self._left_tool = self._taken_over = self._restored = None
