@@ -30,7 +30,8 @@ sheet.replaceSync(`${Names.STEADY} ${Names.HELD}
     html[data-theme=dark] { color-scheme: dark; background: #14181d }
     ${Names.SOFTWARE_NOTICE} { display: none }
     html[data-used] ${Names.HINT} { visibility: hidden !important }
-    input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }`);
+    input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }
+    [role=slider]:focus-visible { outline: 3px solid #4b96ea !important; outline-offset: 2px; }`);
 document.adoptedStyleSheets.push(sheet);
 
 /** @type {Page.View | null} */

@@ -14,12 +14,12 @@ const DEGREES = 180 / Math.PI;
 /** @type {[string, Api.Attachment, string][]} */
 const MOUNTS = [
   ["Hand", "hand", "It moves with the hand as a part of it"],
-  ["Here", "world", "It stays where it is, even in the air"],
+  ["Fixed here", "world", "It stays where it is, even in the air"],
 ];
 
 /** @type {[string, Api.Zone][]} */
 const ZONES = [["None: it is a body", "none"], ["The arm keeps out", "keep_out"], ["The arm is slow", "slow"]];
-const NEW_BOX = /** @type {Partial<Api.Place>} */ ({ shape: "box", size: [0.03, 0.03, 0.05], zone: "none", can_be_held: true }); // m
+const NEW_BOX = /** @type {Partial<Api.Place>} */ ({ shape: "box", size: [0.03, 0.03, 0.05], zone: "none", can_be_held: true, colour: "#0f9d8a" }); // m
 const NEW_ZONE = /** @type {Partial<Api.Place>} */ ({ shape: "box", size: [0.2, 0.2, 0.2] }); // m
 const NEW_PLANE = /** @type {Partial<Api.Place>} */ ({ shape: "plane", size: [0.8, 0.6], T: [[1, 0, 0, 0.3], [0, 0, -1, 0.45], [0, 1, 0, 0.3], [0, 0, 0, 1]] }); // m
 

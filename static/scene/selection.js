@@ -84,10 +84,12 @@ export class Selection {
     // viser hides them again after a lost connection.
     this.#arrows(true);
     this.#bar.hidden = object.held;
+    // The node of one that was just added comes later.
+    this.#changed();
     if (!isNew) return;
     write(this.#name, name);
-    placeNear(this.#bar, this.#scene, pixel ?? sceneIn(this.#scene).pixelOf(pathOf(name)) ?? [0, 0]);
-    this.#changed();
+    const place = [0, 1, 2].map((row) => object.T[row][3]);
+    placeNear(this.#bar, this.#scene, pixel ?? sceneIn(this.#scene).pixelOf(place) ?? [0, 0]);
   }
 
   /** Show the arrows of the object, or show them as the server does. What the arm carries has none. @param {boolean} own */
