@@ -75,16 +75,16 @@ class RunningProgram(NamedTuple):
 
 
 class Takeover(NamedTuple):
-    """The arm was taken from a client of the API, such as a policy, by moving it.
+    """The arm was taken from a script, or from a client of the API such as a policy, by moving it.
 
     Attributes:
-        client: the client, which may be given the arm back.
+        driver: the script or client; a client may be given the arm back.
         by: key of the person who moved it.
         state: the state before.
-        since: time since which the client had driven [s since the epoch].
+        since: time since which the driver had driven [s since the epoch].
     """
 
-    client: Person
+    driver: Person
     by: str
     state: State
     since: float
@@ -114,7 +114,7 @@ class CommandGate:
         self.ended: RunningProgram | None = None
         """The program that was interrupted last, until a participant gets the lease."""
         self.takeover: Takeover | None = None
-        """The newest takeover from a client, while the person who took over drives."""
+        """The newest takeover, while the person who took over drives."""
         self.is_client: Callable[[Person], bool] = lambda _: False
         """Function that returns whether a person is a connected client of the API."""
         self._held_since = 0.0
@@ -487,8 +487,7 @@ class CommandGate:
         arm cannot accept ``command``; the program continues then.
         """
         before, holder, since = self.lease, self.lease.holder, self._held_since
-        suspends = self._suspends(actor)
-        if holder is None or not (suspends or self.program == (holder, actor.key)):
+        if holder is None or not (self.program == (holder, actor.key) or self._suspends(actor)):
             return
         self.check_current(actor)
         arm = self.present()
@@ -496,8 +495,7 @@ class CommandGate:
         # The path of the program is left in any case, also where its state forbids the command.
         arm.deliver(cmd.Hold(), replace(actor, grounds=Grounds.PROGRAM_OWNER))
         self._hold_lease(before.hand_over(holder, actor.person, self._clock()))
-        if suspends:
-            self.takeover = Takeover(holder, actor.key, arm.state, since)
+        self.takeover = Takeover(holder, actor.key, arm.state, since)
         self.recorder.lease("taken over", before, self.lease, actor)
 
     def _granted(self, actor: Actor, *, pacing: bool) -> Actor:

@@ -164,19 +164,19 @@ def common(hub: Hub) -> dict[str, Any]:
     }
 
 
-def taken_over(hub: Hub, person: Person) -> dict[str, Any]:
-    """Return the entries on a takeover by ``person`` from a client; none without one."""
-    takeover = hub.gate.takeover_by(person)
-    if takeover is None or hub.stopped is not None:
-        return {}
-    is_there = hub.participant(takeover.client.key) is not None
-    orders = ["continue"] if is_there else []
-    rewinds = ["rewind"] if hub.arm is not None and hub.arm.state.report is None else []
-    return {
-        "orders": [*orders, *rewinds, *(["keep"] if hub.shown.get("episodes") else [])],
-        "continues": [takeover.client.name, 0, 0],
-        "driven_since": takeover.since,
-    }
+def orders(hub: Hub, participant: Participant) -> dict[str, Any]:
+    """Return the orders that the page of ``participant`` offers, and what they are about."""
+    program, takeover = hub.runner.progress(), hub.gate.takeover_by(participant.person)
+    offered = list(hub.runner.orders(participant)) if hub.arm is not None else []
+    about = [program.name, program.step, program.steps] if program is not None else []
+    entries: dict[str, Any] = {"orders": offered, "continues": about}
+    if takeover is None or hub.arm is None or hub.stopped is not None or "end" in offered:
+        return entries
+    if hub.participant(takeover.driver.key) is not None:
+        entries = {"orders": ["continue"], "continues": [takeover.driver.name, 0, 0]}
+    entries["orders"] += ["rewind"] if hub.arm.state.report is None else []
+    entries["orders"] += ["keep"] if hub.shown.get("episodes") else []
+    return {**entries, "driven_since": takeover.since}
 
 
 def of(hub: Hub, participant: Participant) -> dict[str, Any]:
@@ -218,9 +218,7 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
         ],
         "planning": planning,
         "fraction": round(program.fraction, 2) if program is not None and planning else 0.0,
-        "orders": list(hub.runner.orders(participant)) if hub.arm is not None else [],
-        "continues": [program.name, program.step, program.steps] if program is not None else [],
-        **taken_over(hub, person),
+        **orders(hub, participant),
         "age": round(age, 1) if age >= MIN_SHOWN_AGE else 0,
         **{
             key: value

@@ -132,18 +132,16 @@ def duration(seconds: float) -> str:
     return f"{whole} s" if whole < 100 else f"{whole // 60} min {whole % 60} s"
 
 
-def orders(program: Progress | None, *, may_begin: bool, rewinds: bool) -> tuple[str, ...]:
+def orders(program: Progress | None, *, may_begin: bool) -> tuple[str, ...]:
     """Return the orders that the page offers to the owner of ``program``.
 
-    ``may_begin``: whether the arm is not stopped, and free for the owner. ``rewinds``: whether the
-    owner has taken over.
+    ``may_begin``: whether the arm is not stopped, and free for the owner.
     """
     if program is None:
         return ()
     if program.status in (PlanningPhase.PLANNING.value, *RUNS):
         return (ProgramOrder.END.value,)
-    offered = {ProgramOrder.CONTINUE: program.can_continue, ProgramOrder.REWIND: rewinds}
-    return tuple(order.value for order, is_offered in offered.items() if may_begin and is_offered)
+    return (ProgramOrder.CONTINUE.value,) if may_begin and program.can_continue else ()
 
 
 SHOWN, DONE, NOW, NEXT, ENDED_HERE = "shown", "done", "now", "next", "ended here"

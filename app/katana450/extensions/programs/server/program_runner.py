@@ -63,9 +63,6 @@ class ProgramRunner(Runner):
         self._owner = ProgramOwner(hub, options.owner_silence)
         self.planner = ProgramPlanner(hub, self._owner)
         self._interruption: Interruption | None = None
-        # The newest state that the program has reached, and that of a takeover.
-        self._reached: State | None = None
-        self._taken_over: State | None = None
         self._left_tool: LeftTool | None = None
         # Runs of the present program whose task is new or begins, by the times of their states.
         self._tasks: list[tuple[float, Run]] = []
@@ -147,7 +144,7 @@ class ProgramRunner(Runner):
         if self.planner.script(participant, text, more=more, speed=speed):
             self._run, self._is_news = None, True
             if self.planner.text != before:
-                self._interruption = self._taken_over = self._restored = None
+                self._interruption = self._restored = None
                 self._tasks = []
 
     def set_breakpoints(self, participant: Participant, steps: Sequence[int]) -> None:
@@ -253,7 +250,6 @@ class ProgramRunner(Runner):
             return
         arm = hub.arm
         if arm is not None and arm.caught_up:
-            self._reached = arm.state
             self._runs_as.follow(arm.state, t)
             run, commands = runner.step(program, self._run, arm.state, t)
             try:
@@ -339,8 +335,7 @@ class ProgramRunner(Runner):
         if not self.owns(participant):
             return ()
         free = self.hub.stopped is None and self.hub.lease.holder in (None, participant.person)
-        rewinds = self._taken_over is not None
-        return page_state.orders(self.progress(), may_begin=free, rewinds=rewinds)
+        return page_state.orders(self.progress(), may_begin=free)
 
     def _start_planned(self) -> None:
         """Carry out the order that waits for the end of the planning."""
@@ -364,8 +359,8 @@ class ProgramRunner(Runner):
         planning, interruption = self.planner.planning, self._interruption
         if step is None and (takeover := self.hub.gate.takeover_by(participant.person)):
             self.hub.gate.check_not_stopped()
-            self.hub.give_back(participant, takeover.client)
-            return
+            if self.hub.give_back(participant, takeover.driver):
+                return
         if step is None and self._restored is not None and planning is not None:
             run, motions = self._restored
             assert planning.program is not None
@@ -396,15 +391,12 @@ class ProgramRunner(Runner):
         self._run, self.planner.then = None, order
 
     def _left_run(self, run: Run) -> Run:
-        """Return ``run`` after the lease was taken from it; or that which the arm was set back to.
-
-        If its owner has taken over, its state is kept for ``_rewind``.
-        """
+        """Return how ``run`` ends without the lease, or the run that the arm was set back to."""
         if self._restored is not None:
             return self._restored[0]
         reason, holder = "The lease was taken from the program.", self.hub.lease.holder
         if holder is not None and self._owner.is_person(holder):
-            reason, self._taken_over = f"{holder.name} took over.", self._reached
+            reason = f"{holder.name} took over."
         return runner.ended(run, Phase.STOPPED, reason)
 
     def _note_task(self, run: Run) -> None:
@@ -428,12 +420,9 @@ class ProgramRunner(Runner):
     def _rewind(self, participant: Participant) -> int:
         """Restore the state in which the owner took over, and hold the arm there."""
         takeover = self.hub.gate.takeover_by(participant.person)
-        state = self._taken_over if takeover is None else takeover.state
         if takeover is None:
-            self._owner.check_may_steer(participant.person)
-        if state is None or self.running:
             raise LeaseError("Nobody has taken over from this program.")
-        self.hub.move(participant, cmd.RestoreState(state))
+        self.hub.move(participant, cmd.RestoreState(takeover.state))
         return self.hub.move(participant, cmd.Hold())
 
     def _begin(self, participant: Participant, order: ProgramOrder) -> int | None:
@@ -467,7 +456,7 @@ class ProgramRunner(Runner):
             self.hub, program.name, participant, follow, self._left_tool, holds=reached is None
         )
         self._owner.change_to(participant, began)
-        self._interruption = self._left_tool = self._taken_over = self._restored = None
+        self._interruption = self._left_tool = self._restored = None
         begin = replace(planning.continues or Run(began), number=program.first, started=False)
         self._run = replace(
             begin if reached is None else reached,
