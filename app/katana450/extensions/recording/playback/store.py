@@ -280,9 +280,7 @@ class RecordingStore:
         run = self.run(name)
 
         def simulated() -> State:
-            run.update()
-            if self.is_of_another_robot(run):
-                raise InputError("The recording is of another robot, whose states do not fit.")
+            self._check_robot(run)
             return state_after(session, run.input_until(t))
 
         return await self.work.result(simulated)
@@ -296,24 +294,17 @@ class RecordingStore:
         """
         run = self.run(name)
 
-        def paths() -> tuple[tuple[Span, ...], tuple[Span, ...]]:
-            run.update()
-            attempts = run.attempts()
-            first, second = (attempt_at(attempts, t).path for t in moments)
-            return parted(first, second)
-
-        both = await self.work.result(paths)
-        ends = [
-            await self.state_at(name, spans[-1].end if spans else t, session)
-            for spans, t in zip(both, moments, strict=True)
-        ]
-
         def compared() -> AttemptDifference:
-            first, second = (
-                AttemptResult(spans, run.rows(spans), state)
-                for spans, state in zip(both, ends, strict=True)
-            )
-            return difference(session, first, second)
+            self._check_robot(run)
+            attempts = run.attempts()
+            first, second = (attempt_at(attempts, t) for t in moments)
+            results = [
+                AttemptResult(spans, run.rows(spans), state_after(session, run.input_until(end)))
+                for spans, end in zip(
+                    parted(first.path, second.path), (first.end, second.end), strict=True
+                )
+            ]
+            return difference(session, *results)
 
         return await self.work.result(compared)
 
@@ -326,6 +317,12 @@ class RecordingStore:
         if name not in self._files:
             raise InputError("The server no longer has that recording. Open its file again.")
         return self._files[name][1]
+
+    def _check_robot(self, run: AnyRun) -> None:
+        """Read what was added to ``run``. Raises InputError for one of another robot."""
+        run.update()
+        if self.is_of_another_robot(run):
+            raise InputError("The recording is of another robot, whose states do not fit.")
 
     def is_of_another_robot(self, run: AnyRun) -> bool:
         """Return whether ``run`` is that of another robot than the server's."""
