@@ -90,9 +90,15 @@ def test_person_takes_over_from_a_policy_without_a_step(drive: Drive) -> None:
 
 def test_takeover_is_rewound_stopped_and_refused_to_others(drive: Drive) -> None:
     hub, ada, eve = drive.server.hub, drive.join("ada"), drive.join("eve", Role.OPERATOR)
-    drive.wait(0.5, ada)
+    viewer = drive.join("vera", Role.VIEWER)
+    drive.policy.nudge(1, 0.1)
+    # One motion is no stream, and a person is not taken from.
     with pytest.raises(LeaseError, match="Test holds the arm"):
-        hub.move(eve, cmd.Joint(1, 0.2))
+        hub.move(ada, cmd.Joint(1, 0.2))
+    drive.wait(0.5, ada)
+    for other, why in ((eve, "Test holds the arm"), (viewer, "may only watch")):
+        with pytest.raises(LeaseError, match=why):
+            hub.move(other, cmd.Joint(1, 0.2))
     hub.gate.claim(hub.at_scene(ada.person.key, hub.gate.revocations), of_arm=True)
     assert hub.lease.holder != ada.person
     hub.move(ada, cmd.Joint(1, -0.4))

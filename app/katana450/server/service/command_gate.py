@@ -32,6 +32,10 @@ SETTLE_TIME = 0.3
 messages which waited meanwhile have arrived."""
 
 
+STREAM_GAP, STREAM_TIMEOUT = 0.5, 1.0
+"""[s] Maximum time between two samples of a client that streams, and after the newest one."""
+
+
 @dataclass(frozen=True)
 class StopRecord:
     """A stop and its cause.
@@ -118,6 +122,8 @@ class CommandGate:
         self.is_client: Callable[[Person], bool] = lambda _: False
         """Function that returns whether a person is a connected client of the API."""
         self._held_since = 0.0
+        # Times of the last two samples of the driver.
+        self._samples = -math.inf, -math.inf
         self.revocations = self.motions = 0
         """Number of stops and losses of the lease; of commands that superseded a motion."""
         self.on_stop: Callable[[], None] = lambda: None
@@ -160,6 +166,8 @@ class CommandGate:
             except KatanaError as error:
                 self.recorder.refuse(command, actor, error)
                 raise
+            if any(part.sample for part in command.parts):
+                self._samples = self._samples[1], self._clock()
             if isinstance(command, cmd.Jog):
                 self._jogged = self._clock() if command.rates.any() else -cmd.JOG_TIME
             self.recorder.command(command, granted)
@@ -463,6 +471,7 @@ class CommandGate:
         """Set the lease, and note a new holder."""
         if lease.holder != self.lease.holder:
             self.takeover, self._held_since = None, time.time()
+            self._samples = -math.inf, -math.inf
         self.lease = lease
 
     def takeover_by(self, person: Person) -> Takeover | None:
@@ -473,10 +482,11 @@ class CommandGate:
     def _suspends(self, actor: Actor) -> bool:
         """Return whether ``actor`` takes over by moving the arm that a client of the API drives.
 
-        An admin does so, and a person with the access link of the client.
+        An admin does so, and a person with the access link of the client, while that streams.
         """
-        client, person = self.lease.driver, actor.person
-        if client is None or client == person or not self.is_client(client):
+        client, person, (before, newest) = self.lease.driver, actor.person, self._samples
+        streams = newest - before < STREAM_GAP and self._clock() - newest < STREAM_TIMEOUT
+        if client is None or client == person or not (streams and self.is_client(client)):
             return False
         return person.role.may_take or (client.link != "" and client.link == person.link)
 
