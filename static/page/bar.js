@@ -2,13 +2,11 @@
 import { element, write } from "../dom.js";
 import { button } from "../instruments/shape.js";
 import * as Pace from "../pace.js";
-import { messageOf } from "../server.js";
 import { leaseControls, replaceKeepingFocus } from "./lease.js";
 import { clock } from "./words.js";
 
 const SIMULATION =
   "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
-const NEWEST = 1e11; // s since the epoch, after all that is recorded
 const { body } = document;
 const headline = element("headline", HTMLElement);
 const [orders, lease] = [element("orders", HTMLElement), element("acts", HTMLElement)];
@@ -111,23 +109,15 @@ export class Bar {
     this.#orders = key;
     const [name, step, steps] = status.continues;
     const controls = status.orders.map((order) => {
-      if (order === "keep") return button("Keep as correction", () => this.#keep(status.driven_since ?? 0), { title: `As an episode, since ${name} drove` });
       const resumes = order === "continue";
-      const other = order === "rewind" ? "Rewind" : status.planning ? "Cancel" : "End";
-      const control = button(resumes ? `Continue ${name}` : other, () => this.#page.say({ do: "steer", order }));
-      if (resumes) Object.assign(control, { className: "main", title: steps ? `Continue ${name} at step ${step} of ${steps}` : `Give the arm back to ${name}` });
+      const other = order === "rewind" ? "Rewind" : order === "keep" ? "Keep as correction" : status.planning ? "Cancel" : "End";
+      const act = order === "keep" ? () => import("../timeline/api.js").then(({ keepSince }) => keepSince(this.#page, status.driven_since ?? 0)) : () => this.#page.say({ do: "steer", order });
+      const control = button(resumes ? `Continue ${name}` : other, act);
+      if (resumes) Object.assign(control, { className: "main" }, steps && { title: `Continue ${name} at step ${step} of ${steps}` });
       if (order === "rewind") control.title = "Set arm and objects back to where you took over";
       return control;
     });
     replaceKeepingFocus(orders, controls);
-  }
-
-  // Keep what was driven since a time as an episode, without what a rewind left.
-  /** @param {number} start [s since the epoch] */
-  async #keep(start) {
-    const { ask } = await import("../timeline/api.js");
-    const kept = ask(this.#page.name, { do: "keep", start, end: NEWEST, outcome: "success" });
-    this.#page.toast(await kept.then(({ number }) => `Episode ${number} is kept: see Episodes.`, messageOf));
   }
 
   // Without a connection the state of the arm is unknown, and its driver too.

@@ -1,10 +1,11 @@
 // Requests to the server about recordings.
-import { queryOf, request } from "../server.js";
+import { messageOf, queryOf, request } from "../server.js";
 
 /** @typedef {[start: number, end: number]} Span */
 /** @typedef {[t: number, kind: string, words: string]} Mark */
 /** What was done between two continuations: `since` is the moment of its parent that it continued from, `path` leads to its end. @typedef {{ number: number, parent: number | null, start: number, end: number, since: number | null, path: Span[], drivers: [name: string, source: string][], name: string, outcome: string, hidden: boolean }} Attempt */
 const API = "api/v1/playback";
+const NEWEST = 1e11; // s since the epoch, after all that is recorded
 export const RING = "ring"; // name of the last minutes
 
 /** Return the answer, or null if it has no content. Throws an error with the reason for a refusal. @param {string} url @param {RequestInit} [options] */
@@ -21,6 +22,12 @@ export const timeline = (of) => answered(`${API}/${encodeURIComponent(of)}`);
 
 /** Send a request about episodes from the window `page`. @param {string} page @param {object} body */
 export const ask = (page, body) => post(`api/v1/episodes?page=${page}`, JSON.stringify(body));
+
+/** Keep a part of the last minutes as an episode; return what to tell the person. @param {string} page @param {number} start @param {number} end @param {string} outcome */
+export const keep = (page, start, end, outcome) => ask(page, { do: "keep", start, end, outcome }).then(({ number }) => `Episode ${number} is kept: see Episodes.`, messageOf);
+
+/** Keep what was driven since `start`, as a correction. @param {Page.Context} page @param {number} start */
+export const keepSince = async ({ name, toast }, start) => toast(await keep(name, start, NEWEST, "success"));
 
 // Show a moment in the window `page`, and one of a second recording if there is one.
 /** @param {Record<string, string | number>} query @returns {Promise<{ moving: string[] }>} */

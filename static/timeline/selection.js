@@ -1,7 +1,7 @@
 // The selected part of a recording: its ends, and what can be done with it.
 import { messageOf, queryOf, request } from "../server.js";
 import { ScriptRun } from "../teach/run.js";
-import { ask } from "./api.js";
+import { keep } from "./api.js";
 import { lengthOf, placeOf } from "./axis.js";
 import { Work } from "./work.js";
 
@@ -65,13 +65,7 @@ export class Selection {
   /** Keep the part as an episode. @param {Part | null} part @param {string} outcome */
   async keep(part, outcome) {
     const { toast, name } = this.#page;
-    if (!part) return;
-    try {
-      const { number } = await ask(name, { do: "keep", start: part.from, end: part.to, outcome });
-      toast(`Episode ${number} is kept: see Episodes.`);
-    } catch (error) {
-      toast(messageOf(error));
-    }
+    if (part) toast(await keep(name, part.from, part.to, outcome));
   }
 
   /** Drive the arm along the motion of the part, as a program that the bar shows and steers. @param {Part | null} part */

@@ -290,13 +290,6 @@ class Hub:
             lambda lease, t: lease.hand_over(giver, taker, t), actor, "handed over", holds=holds
         )
 
-    def give_back(self, participant: Participant, driver: Person) -> bool:
-        """Hand the lease of ``participant`` to ``driver``; return whether it is connected."""
-        taker = self._participants.get(driver.key)
-        if taker is not None:
-            self.hand_over(participant, taker.number)
-        return taker is not None
-
     def decline(self, participant: Participant, number: int) -> None:
         """Decline the request of the participant of ``number`` for the lease, and notify it."""
         giver, requester = self.giver(participant), self._numbered(number)

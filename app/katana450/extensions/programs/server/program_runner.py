@@ -359,7 +359,8 @@ class ProgramRunner(Runner):
         planning, interruption = self.planner.planning, self._interruption
         if step is None and (takeover := self.hub.gate.takeover_by(participant.person)):
             self.hub.gate.check_not_stopped()
-            if self.hub.give_back(participant, takeover.driver):
+            if (client := self.hub.participant(takeover.driver.key)) is not None:
+                self.hub.hand_over(participant, client.number)
                 return
         if step is None and self._restored is not None and planning is not None:
             run, motions = self._restored
