@@ -2,7 +2,7 @@
 // window alone, with a name and the time of the change.
 import { sceneIn, sceneOf, write } from "../dom.js";
 import { html } from "../instruments/shape.js";
-import { readState } from "../server.js";
+import { readState, request } from "../server.js";
 import { isMesh } from "./glow.js";
 
 const ROW = "tr[data-branch]";
@@ -13,14 +13,11 @@ export class Branches {
   #scene;
   #store;
   #arm; // description of the arm
-  /** @type {Map<string, { words: string, q: number[], refusal: string }>} */
-  #options = new Map(); // name of a branch to its words and joint angles
   /** @type {string | null} */
   #row = null; // name of the branch under the pointer
   /** @type {{ object: Three.Object3D, material: Three.Material | null } | null} */
   #ghost = null; // {object, material} of that branch
   #label = html("p", { id: "branch-label", class: "scene-label", hidden: "" });
-  #asked = 0; // number of the last question
 
   /** @param {HTMLElement} stage @param {HTMLIFrameElement} scene @param {Api.Arm} arm @param {Page.Store} store */
   constructor(stage, scene, arm, store) {
@@ -28,7 +25,6 @@ export class Branches {
     this.#arm = arm;
     this.#store = store;
     stage.append(this.#label);
-    this.#read();
   }
 
   /** @param {Window} inner */
@@ -53,8 +49,10 @@ export class Branches {
 
   /** @param {string} name @param {string} colour */
   async #show(name, colour) {
-    const state = await this.#read();
-    const option = this.#options.get(name);
+    const [answer, state] = await Promise.all([request("api/v1/branches").catch(() => null), readState()]);
+    /** @type {Api.Branches | undefined} */
+    const branches = await answer?.json();
+    const option = branches?.choices.find((choice) => choice.name === name);
     if (!state || !option || this.#row !== name || this.#ghost || option.refusal) return;
     const { drawing, node } = sceneIn(this.#scene);
     const links = this.#arm.links.map(({ path }) => node(`/arm/${path.join("/")}`));
@@ -72,7 +70,9 @@ export class Branches {
     frame.add(copy.object);
     drawing().scene.add(frame);
     this.#ghost = { ...copy, object: frame };
-    write(this.#label, option.words);
+    const parts = name.split("-").map((word, k) => (word === state.branch?.[k] ? "" : `${PARTS[k]} ${word}`));
+    const seconds = option.time / (this.#store.live?.speed ?? 1);
+    write(this.#label, [...parts.filter(Boolean), `${seconds.toFixed(1)} s`].join(", "));
     this.#label.hidden = false;
     drawing().requestRender();
   }
@@ -111,25 +111,5 @@ export class Branches {
     this.#ghost = null;
     this.#label.hidden = true;
     sceneOf(this.#scene)?.viewer()?.requestRender();
-  }
-
-  /** Read the options and return the state to which they belong; null without an answer. @returns {Promise<Api.State | null>} */
-  async #read() {
-    const asked = (this.#asked += 1);
-    const [answer, state] = await Promise.all([fetch("api/v1/branches").catch(() => null), readState()]);
-    if (!answer?.ok || !state || asked !== this.#asked) return null;
-    /** @type {Api.Branches} */
-    const { choices } = await answer.json();
-    const now = state.branch ?? [];
-    this.#options = new Map(
-      choices.map(({ name, time, q, refusal }) => {
-        const parts = name.split("-");
-        const differs = parts.map((word, k) => (word === now[k] ? "" : `${PARTS[k]} ${word}`));
-        const seconds = time / (this.#store.live?.speed ?? 1);
-        const words = [...differs.filter(Boolean), `${seconds.toFixed(1)} s`].join(", ");
-        return [name, { words, q, refusal }];
-      }),
-    );
-    return state;
   }
 }

@@ -18,6 +18,7 @@ const FINE = 0.2; // fraction of the way of the pointer, with Shift
 const SOON = 5000; // ms after a drag in which a typed number belongs to it
 const FARTHEST = 1.5; // m; the server takes no larger coordinate
 const SIZE = "/size"; // end of the name of a node at a corner of a box, which changes its size
+const HINTS = [[SIZE, "Change the size"], ["/turn", "Turn the object"], ["", "Move the object"]]; // by the ends of names
 const HANDLES = ["/target/move", "/target/elbow", "/handles"];
 const FADED = 0.25; // opacity of the other parts while one is under the pointer or dragged
 
@@ -65,6 +66,7 @@ export class Handle {
   #sending = false;
   /** @type {Three.Object3D | null} */
   #lit = null; // the part under the pointer, or that is dragged
+  #hint = ""; // what it changes of an object, whose two handles look alike
   /** @type {{ pixel: Page.Pixel, touch: boolean, snaps: boolean, fine: boolean }} */
   #pointer = { pixel: [0, 0], touch: false, snaps: false, fine: false };
   // The state line and the panel say the same to screen readers.
@@ -92,7 +94,10 @@ export class Handle {
   light(part) {
     if (this.#drag || part === this.#lit) return;
     this.#lit = part;
-    const { drawing, node } = sceneIn(this.#scene);
+    const { drawing, nameOf, node, owner } = sceneIn(this.#scene);
+    const handle = owner(part, (object) => /^\/handles\//.test(nameOf(object)));
+    this.#hint = handle ? HINTS.find(([end]) => nameOf(handle).endsWith(end))?.[1] ?? "" : "";
+    this.#draw();
     /** @type {Three.Mesh[]} */
     const shapes = [];
     for (const name of HANDLES) node(name)?.traverse((object) => void (isMesh(object) && shapes.push(object)));
@@ -221,8 +226,13 @@ export class Handle {
 
   #draw() {
     const drag = this.#drag;
-    this.#label.hidden = !drag || drag.axis === null || this.#typed !== null;
-    if (!drag || drag.axis === null) return;
+    const isDragged = drag !== null && drag.axis !== null;
+    this.#label.hidden = !(isDragged || (!drag && this.#hint)) || this.#typed !== null;
+    if (this.#label.hidden) return;
+    if (!drag || drag.axis === null) {
+      write(this.#label, this.#hint);
+      return placeBeside(this.#label, this.#scene, this.#pointer.pixel, this.#pointer.touch);
+    }
     const { clearance } = this.#store.live ?? {};
     const near = clearance ? `\n${clearance.distance.toFixed(1)} mm to the ${clearance.parts[1]}` : "";
     const number = signed((drag.shown + drag.lengths[drag.axis]) * (drag.turns ? DEGREES : 1000));
