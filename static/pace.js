@@ -6,7 +6,6 @@ const FRESH = 500;
 const box = element("speed", HTMLElement);
 const speed = first("input", HTMLInputElement, box);
 const percent = first("output", HTMLOutputElement, box);
-const name = first("span", HTMLElement, box);
 const pause = element("pause", HTMLButtonElement);
 let refusal = "";
 /** @type {"pause" | "resume"} */
@@ -56,6 +55,6 @@ export function draw(status) {
   pause.title = held;
   speed.disabled = Boolean(refusal);
   box.title = refusal || (status?.step_speed ? "A step of the program has set this speed. Yours returns at the end." : "");
-  write(name, status?.step_speed ? "Step" : "Speed");
+  write(first("span", HTMLElement, box), status?.step_speed ? "Step" : "Speed");
   if (status && performance.now() - set > FRESH) show(Math.round(100 * status.speed));
 }

@@ -1,10 +1,10 @@
 // The parts of the page that are loaded when they are first used.
 import { element, onClick } from "../dom.js";
-import { NARROW } from "../viser/names.js";
 
 const OPEN = "katana450.instruments.open";
 const WELCOMED = "katana450.welcome";
 const PAST = "katana450.timeline.open";
+export const phone = matchMedia("(max-width: 560px)");
 export const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
 // Cards over the scene that only some servers have, by the field of the status that they show.
 const CARDS = { arm: () => import("../arm/arm.js"), cameras: () => import("../cameras/cameras.js") };
@@ -124,8 +124,8 @@ export class Parts {
     const button = element("instruments-button", HTMLButtonElement);
     button.ariaExpanded = String(shown);
     kept.setItem(OPEN, shown ? "yes" : "no");
-    // On a phone there is no room for both.
-    if (shown && matchMedia(NARROW).matches) window.katana?.closeSheets();
+    // On a phone there is no room for a sheet below them.
+    if (shown && phone.matches) window.katana?.closeSheets();
     if (shown && !this.panel) {
       const { Panel } = await import("../instruments/panel.js");
       this.panel ??= new Panel(element("instruments", HTMLElement), { say, watch: this.#watch, kept, quietly: QUIETLY });

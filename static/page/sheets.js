@@ -2,7 +2,7 @@
 import { element, first, sceneOf } from "../dom.js";
 import * as Jog from "../jog.js";
 import * as Objects from "../objects.js";
-import { NARROW } from "../viser/names.js";
+import { phone } from "./parts.js";
 
 const OPEN = "katana450.sheets.open"; // ids
 const SIDE = "katana450.sheets.side"; // left or right
@@ -74,7 +74,7 @@ export class Sheets {
     buttonOf(id).setAttribute("aria-expanded", String(shown));
     if (id === "jog") Jog.show(shown);
     if (shown) sceneOf(this.#page.scene)?.fold?.();
-    if (shown && matchMedia(NARROW).matches) this.#parts.showInstruments(false);
+    if (shown && phone.matches) this.#parts.showInstruments(false);
     if (id === "teach") this.#parts.teach?.show(shown);
     if (id === "objects") Objects.show(shown);
   }

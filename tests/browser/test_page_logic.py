@@ -24,7 +24,7 @@ def page(browser: Browser) -> Iterator[Page]:
 
 
 def test_times_are_those_of_the_browser_and_oneself_is_you(browser: Browser) -> None:
-    with bare_page(browser, locale="de-DE", timezone_id="America/New_York") as page:
+    with bare_page(browser, locale="en-GB", timezone_id="America/New_York") as page:
         named = "({ named }, words) => named(words, [])"
         words = "Started by Anna at 2026-11-29T14:43:27+00:00. Axis 2 is at its limit."
         said = module(page, "page/words.js", named, words)
