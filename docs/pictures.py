@@ -6,10 +6,13 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
+from zipfile import ZipFile
 
 import imageio.v3 as imageio
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from katana450.client import Client, connect
@@ -165,6 +168,70 @@ def instruments(page: ViserPage) -> None:
         page.screenshot(IMAGES / "instruments.png")
 
 
+EXAMPLES = Path(__file__).parents[1] / "examples" / "programs"
+
+STACK = """
+name: Stack
+frame: base
+scene:
+  - {name: lower, shape: box, size: [34, 34, 34], pose: [250, 50, 0, 0, 0, 0], can_be_held: true}
+  - {name: middle, shape: box, size: [34, 34, 34], pose: [300, -60, 0, 0, 0, 0], can_be_held: true}
+  - {name: upper, shape: box, size: [34, 34, 34], pose: [240, -140, 0, 0, 0, 0], can_be_held: true}
+steps:
+  - stack: {object: middle, on: lower}
+  - stack: {object: upper, on: middle}
+"""
+
+SLIP = """
+name: Slip
+frame: base
+scene: [{name: cup, shape: cylinder, size: [32, 90], pose: [380, 0, 0, 0, 0, 0], can_be_held: true}]
+steps: [{pick: cup}]
+"""
+
+WINDOWS = {"light": WINDOW, "dark": WINDOW, "phone": (390, 844)}
+"""Sizes of the window of the pictures of the physics, by their names."""
+
+
+def physics(page: ViserPage) -> None:
+    """Make one picture per window of an open drawer, a stack, a push and a cup that slips."""
+    sheets: dict[str, list[NDArray[np.uint8]]] = {name: [] for name in WINDOWS}
+    push, drawer = (
+        (EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8") for name in ("tower", "drawer")
+    )
+    with connect(page.page.url.split("/?")[0].rstrip("/"), "Physics") as arm:
+        for text in (drawer, STACK, push, SLIP):
+            file = BytesIO()
+            with ZipFile(file, "w") as scene:
+                objects = yaml.safe_load(text)["scene"]
+                scene.writestr("scene.yaml", yaml.safe_dump({"scene": 1, "objects": objects}))
+            arm.load_scene(file.getvalue())
+            send(arm, text)
+            program(arm, lambda progress: progress.status in ("ready", "refused"))
+            # Drawing would make the ticks late, and a handle that is pulled by jerks slips.
+            page.frame.evaluate("() => harness.draw(false)")
+            arm.ask(Steer(order=ProgramOrder.RUN))
+            program(arm, lambda progress: progress.status == "done")
+            page.frame.evaluate("() => harness.draw(true)")
+            if text == SLIP:
+                arm.gripper(arm.query(answers.State).gripper - WEAKER)
+            for name, (width, height) in WINDOWS.items():
+                page.page.set_viewport_size({"width": width, "height": height})
+                page.page.emulate_media(color_scheme="dark" if name == "dark" else "light")
+                page.page.wait_for_timeout(1500)
+                page.wait_drawn()
+                picture = page.picture()
+                sheets[name].append(picture if name == "phone" else halved(picture))
+    for name, pictures in sheets.items():
+        rows = [pictures] if name == "phone" else [pictures[:2], pictures[2:]]
+        sheet = np.vstack([np.hstack(row) for row in rows])
+        imageio.imwrite(IMAGES / f"physics-{name}.jpg", sheet, quality=80)
+
+
+WEAKER = 0.002
+"""[rad] Opening of the fingers that ends most of the force on what they hold."""
+
+
 def send(arm: Client, text: str) -> None:
     """Send the text of a script to the server, which plans it."""
     parts = [text[start : start + 600] for start in range(0, len(text), 600)]
@@ -189,8 +256,13 @@ def tile(page: ViserPage) -> NDArray[np.uint8]:
     across, down = TILE
     height, width, _ = picture.shape
     x, y = (width - across) // 2, (height - down) // 2
-    shown = picture[y : y + down, x : x + across].astype(np.uint16)
-    quarters = shown.reshape(down // 2, 2, across // 2, 2, 3)
+    return halved(picture[y : y + down, x : x + across])
+
+
+def halved(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return ``picture`` (height, width, 3) at half its size."""
+    down, across, _ = picture.shape
+    quarters = picture.astype(np.uint16).reshape(down // 2, 2, across // 2, 2, 3)
     smaller: NDArray[np.uint8] = (quarters.sum(axis=(1, 3)) // 4).astype(np.uint8)
     return smaller
 
@@ -200,6 +272,7 @@ PICTURES: dict[Callable[[ViserPage], None], Camera] = {
     gallery: Camera(),
     pouring: Camera((1.19, 0.68, 0.80), (0.2, 0.09, 0.2), math.radians(50.0)),
     instruments: Camera((0.9, -0.75, 0.7), (0.25, 0.0, 0.2), math.radians(45.0)),
+    physics: Camera((0.95, -0.85, 0.55), (0.33, 0.0, 0.1), math.radians(45.0)),
     out_of_reach: Camera((0.75, -1.25, 0.70), (0.3, -0.06, 0.17), math.radians(40.0)),
 }
 
