@@ -5,4 +5,4 @@
 export const numberIn = (text) => (text.trim() ? Number(text.trim().replace(",", ".").replace("−", "-")) : NaN);
 
 /** Return why a typed text was not sent. @param {string} name @param {string} text */
-export const notNumber = (name, text) => (text.trim() ? `${name}: ${text} is not a number. It was not sent.` : `${name} needs a number.`);
+export const notNumber = (name, text) => (text.trim() ? `${name}: ${text} is not a number.` : `${name} needs a number.`);

@@ -106,7 +106,7 @@ export class Panel {
 
   #toolbar() {
     const spans = Object.entries(SPANS).map(([span, label]) => radio("span", span, label, Number(span) === this.#view.span, () => this.#look({ span: Number(span) })));
-    const pause = toggle("Pause", (on) => this.#look({ end: on ? (this.#history?.newest ?? null) : null }), {
+    const pause = toggle("Freeze", (on) => this.#look({ end: on ? (this.#history?.newest ?? null) : null }), {
       title: "Stop the plots; new values are still stored",
     });
     const choose = toggle("Choose", (on) => this.#board?.list.toggleAttribute("hidden", !on), { title: "Show and hide instruments" });

@@ -54,7 +54,7 @@ def test_a_knob_turns_a_joint_and_the_plots_follow(page: ViserPage, truth: Truth
         lambda: legend(page, "joint-angles")[0] == pytest.approx(reached, abs=0.06), "the end"
     )
     # A cursor reads the past: the points on the way, and the angle of before.
-    pause = page.page.locator("#instruments .toolbar button", has_text="Pause")
+    pause = page.page.locator("#instruments .toolbar button", has_text="Freeze")
     pause.click()
     card(page, "joint-angles").locator(".drawn").focus()
     read: list[float] = []
