@@ -9,12 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Self
 
-from katana450.extensions.motor_bus.packets import (
-    MAX_POSITION,
-    MIN_POSITION,
-    TORQUE_ENABLE,
-    TURN,
-)
+from katana450.extensions.motor_bus.feetech import FEETECH
+from katana450.extensions.motor_bus.packets import TURN
 from katana450.extensions.real_arm.emulator.server import ServoServer
 from katana450.extensions.real_arm.servo.emulated_servos import EmulatedServos, calibration_text
 
@@ -52,8 +48,8 @@ class EmulatedMotors(EmulatedServos):
         self.motion = motion
         super().__init__()
         for motor in self.motors:
-            motor[MIN_POSITION], motor[MAX_POSITION] = RANGE
-            motor[TORQUE_ENABLE] = 1
+            motor[FEETECH.min_position], motor[FEETECH.max_position] = RANGE
+            motor[FEETECH.torque_enable] = 1
 
     def step(self, seconds: float) -> None:  # noqa: ARG002
         """Put the motors where the hand has them."""
@@ -67,7 +63,7 @@ class EmulatedMotors(EmulatedServos):
 
     @property
     def torque(self) -> list[int]:
-        return [motor[TORQUE_ENABLE] for motor in self.motors]
+        return [motor[FEETECH.torque_enable] for motor in self.motors]
 
     def answer(self, data: bytes) -> bytes:
         return b"".join(self.replies(data))

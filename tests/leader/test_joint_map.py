@@ -13,15 +13,10 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.leader.leader_command import prepare
-from katana450.extensions.motor_bus.bus import MotorBus, SilentMotorError
+from katana450.extensions.motor_bus.bus import MotorBus, MotorRequestError
 from katana450.extensions.motor_bus.calibration import decoded_calibration, read_calibration
-from katana450.extensions.motor_bus.packets import (
-    HOMING_OFFSET,
-    PRESENT_POSITION,
-    TORQUE_ENABLE,
-    MotorError,
-    Packet,
-)
+from katana450.extensions.motor_bus.feetech import FEETECH
+from katana450.extensions.motor_bus.packets import Packet
 from katana450.server.api import answers
 from tests.leader.emulated_leader import RANGE, EmulatedMotors, calibration
 
@@ -162,35 +157,35 @@ class WiredPort:
 
 def test_bus_reads_the_motors_through_noise() -> None:
     port = WiredPort()
-    bus = MotorBus(port)
+    bus = MotorBus(port, FEETECH)
     # An adapter may return what was sent, and answers of other motors.
-    port.noise = b"\x00\xff\xff" + Packet(9, 0, b"ab").encoded
+    port.noise = b"\x00\xff\xff" + FEETECH.framing.encoded(Packet(9, 0, b"ab"))
     offsets = [motor["homing_offset"] for motor in calibration().values()]
-    assert [bus.read(motor, HOMING_OFFSET) for motor in range(1, 7)] == offsets
+    assert [bus.read(motor, FEETECH.homing_offset) for motor in range(1, 7)] == offsets
     port.motors.place((0.1, -0.1, 0.2, -0.2, 1.0, -1.0))
-    positions = bus.read_all((1, 2, 3, 4, 5, 6), PRESENT_POSITION)
+    positions = bus.read_all((1, 2, 3, 4, 5, 6), FEETECH.position)
     assert positions[5] - positions[6] == pytest.approx(2.0 * 4096 / (2.0 * math.pi), abs=1.0)
-    assert bus.errors(2) == MotorError(0)
+    assert bus.errors(2) == 0
 
 
 def test_silent_motors_are_named() -> None:
     port = WiredPort()
     for number in (2, 4):
         port.motors.motors[number - 1].silent = True
-    bus = MotorBus(port)
-    with pytest.raises(SilentMotorError, match="do not answer: 2, 4"):
-        bus.read_all((1, 2, 3, 4), PRESENT_POSITION)
-    with pytest.raises(SilentMotorError, match="do not answer: 4"):
-        bus.read(4, HOMING_OFFSET)
+    bus = MotorBus(port, FEETECH)
+    with pytest.raises(MotorRequestError, match="do not answer: 2, 4"):
+        bus.read_all((1, 2, 3, 4), FEETECH.position)
+    with pytest.raises(MotorRequestError, match="do not answer: 4"):
+        bus.read(4, FEETECH.homing_offset)
 
 
 def test_torque_is_switched_off_only_with_the_calibration_of_this_leader() -> None:
     port = WiredPort()
     known = decoded_calibration(calibrated())
-    prepare(MotorBus(port), known, (1, 2, 3, 4, 5, 6))
+    prepare(MotorBus(port, FEETECH), known, (1, 2, 3, 4, 5, 6))
     assert not any(port.motors.torque)
-    port.motors.motors[2][TORQUE_ENABLE] = 1
+    port.motors.motors[2][FEETECH.torque_enable] = 1
     other = decoded_calibration(calibrated(homing_offset=5))
     with pytest.raises(InputError, match="elbow_flex is 0 in the motor and 5 in the calibration"):
-        prepare(MotorBus(port), other, (3,))
+        prepare(MotorBus(port, FEETECH), other, (3,))
     assert port.motors.torque[2]

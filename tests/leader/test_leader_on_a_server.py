@@ -16,7 +16,7 @@ import pytest
 from katana450.client import Client, connect
 from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.motor_bus.calibration import decoded_calibration
-from katana450.extensions.motor_bus.packets import PRESENT_POSITION
+from katana450.extensions.motor_bus.feetech import FEETECH
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 from tests.waiting import until
@@ -84,7 +84,7 @@ def posture(watcher: Client, tmp_path: Path, angles: tuple[float, ...]) -> np.nd
     joints = JointMap(calibration, watcher.query(answers.Arm))
     motors = EmulatedMotors()
     motors.place(angles)
-    ticks = {motor: motors.motors[motor - 1][PRESENT_POSITION] for motor in joints.motors}
+    ticks = {motor: motors.motors[motor - 1][FEETECH.position] for motor in joints.motors}
     return joints.posture(ticks).q
 
 

@@ -12,6 +12,7 @@ from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.leader.leader_command import LeaderRun
 from katana450.extensions.motor_bus.bus import MotorBus
 from katana450.extensions.motor_bus.calibration import decoded_calibration
+from katana450.extensions.motor_bus.feetech import FEETECH
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.leader.follower_bench import Bench, ServerState
@@ -72,7 +73,9 @@ def test_enter_before_the_server_has_taken_the_program_ends_and_begins_again() -
                 await asyncio.sleep(0.01)
 
     async def run() -> None:
-        task = asyncio.create_task(LeaderRun(client, MotorBus(WiredPort()), joints, keyboard).run())
+        task = asyncio.create_task(
+            LeaderRun(client, MotorBus(WiredPort(), FEETECH), joints, keyboard).run()
+        )
         await until(1)
         fingers.pressed = True
         await asyncio.sleep(0.2)

@@ -15,14 +15,14 @@ import pytest
 from benchmarks.lerobot_environment import environment_of, prepare_lerobot
 from katana450.cli.main import main as katana450
 from katana450.client import connect
-from katana450.extensions.motor_bus import packets as reg
 from katana450.extensions.motor_bus.calibration import read_calibration
+from katana450.extensions.motor_bus.packets import TURN
 from katana450.extensions.real_arm.emulator.server import ServoServer
-from katana450.extensions.real_arm.servo.emulated_servos import RANGES
+from katana450.extensions.real_arm.servo.emulated_servos import STOPS
 from katana450.maths.geometry.arrays import FloatArray
 from tests.browser.server import RECORDING_APP, ROOT, AppServer
 from tests.cli.terminal import Terminal
-from tests.real_arm.emulated_so101 import served
+from tests.real_arm.emulated_servo_arm import served
 from tests.recording.lerobot_check import rows_of
 
 pytestmark = pytest.mark.long
@@ -104,13 +104,13 @@ def hold(arm: ServoServer, ticks: Sequence[int], seconds: float) -> None:
     """Move the joints by hand."""
     with arm.lock:
         for motor, goal in zip(arm.arm.motors, ticks, strict=True):
-            motor[reg.TORQUE_ENABLE], motor[reg.GOAL_POSITION] = 1, goal
+            motor[motor.make.torque_enable], motor[motor.make.goal_position] = 1, goal
     time.sleep(seconds)
 
 
 def calibrate(start: list[str], part: str, device: dict[str, Any], arm: ServoServer) -> None:
     """Calibrate an arm by `lerobot-calibrate`, as a person does."""
-    middle, ends = [sum(stops) // 2 for stops in RANGES], [[0] * 6, [reg.TURN - 1] * 6] * 2
+    middle, ends = [sum(stops) // 2 for stops in STOPS], [[0] * 6, [TURN - 1] * 6] * 2
 
     def person(shown: Terminal) -> None:
         for prompt, places in (("to the middle", [middle]), ("Press ENTER to stop", ends)):
@@ -120,12 +120,12 @@ def calibrate(start: list[str], part: str, device: dict[str, Any], arm: ServoSer
                     hold(arm, place, 1.5)
                     shown.read()
                 for motor in arm.arm.motors:
-                    motor[reg.TORQUE_ENABLE] = 0
+                    motor[motor.make.torque_enable] = 0
                 shown.type("\n")
 
     run([*start, "calibrate"], person, {part: device})
     calibration = read_calibration(device["calibration_dir"] / f"{device['id']}.json")
-    for known, (low, high) in zip(calibration.values(), RANGES, strict=True):
+    for known, (low, high) in zip(calibration.values(), STOPS, strict=True):
         assert abs(known.range_max - known.range_min - (high - low)) <= 2
 
 

@@ -33,12 +33,12 @@ from katana450.extensions.motor_bus.bus import (
     PORT,
     BusLostError,
     MotorBus,
-    SilentMotorError,
+    MotorRequestError,
     check_calibration,
     open_port,
 )
 from katana450.extensions.motor_bus.calibration import Calibration, read_calibration
-from katana450.extensions.motor_bus.packets import PRESENT_POSITION, TORQUE_ENABLE
+from katana450.extensions.motor_bus.feetech import FEETECH
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.sdk import answers, requests
 from katana450.sdk import program_requests as programs
@@ -90,7 +90,7 @@ def lead(options: Namespace) -> int:
     calibration = read_calibration(options.calibration)
     port = open_port(DeviceAddress.parse(options.port, PORT), "the leader")
     try:
-        bus = MotorBus(port)
+        bus = MotorBus(port, FEETECH)
 
         async def drive() -> int:
             async with aconnect(options.url, NAME, options.token) as client:
@@ -109,15 +109,15 @@ def lead(options: Namespace) -> int:
 def prepare(bus: MotorBus, calibration: Calibration, motors: tuple[int, ...]) -> None:
     """Switch the torque of ``motors`` off, so that a hand can move them.
 
-    Raises SilentMotorError if one does not answer, and InputError if the calibration is not that
+    Raises MotorRequestError if one does not answer, and InputError if the calibration is not that
     of this leader. Nothing that the motors keep without power is written.
     """
     names = {motor.id: name for name, motor in calibration.items()}
     for motor in motors:
         check_calibration(bus, names[motor], calibration[names[motor]])
-        bus.write(motor, TORQUE_ENABLE, 0)
+        bus.write(motor, FEETECH.torque_enable, 0)
         if errors := bus.errors(motor):
-            print(printable(f"{names[motor]} reports: {errors.words}."))
+            print(printable(f"{names[motor]} {bus.make.sentence(errors)}."))
 
 
 class LeaderRun:
@@ -174,8 +174,8 @@ class LeaderRun:
     def _posture(self) -> LeaderPosture | None:
         """Return the posture of the leader; None if it does not answer. Raises BusLostError."""
         try:
-            return self._joints.posture(self._bus.read_all(self._joints.motors, PRESENT_POSITION))
-        except SilentMotorError:
+            return self._joints.posture(self._bus.read_all(self._joints.motors, FEETECH.position))
+        except MotorRequestError:
             return None
 
     async def _watch(self) -> None:

@@ -1,1 +1,1 @@
-"""The bus of Feetech servos: packets, exchanges within deadlines, calibration files of LeRobot."""
+"""Buses of servos: packets, exchanges within deadlines, calibration files of LeRobot."""

@@ -13,16 +13,20 @@ from katana450.errors import InputError
 from katana450.extensions.motor_bus.packets import MAX_ID, TURN
 
 AXES = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
-"""Names of the motors of the joints of an SO-101 in its calibration, and in its description."""
+"""Names of the motors of the joints of every arm here in its calibration, and of the joints of an
+SO-101 in its description."""
 
 GRIPPER = "gripper"
-"""Name of the motor of its jaw, and of the joint of that."""
+"""Name of the motor of the jaw, and of the joint of that."""
 
 MOTORS = (*AXES, GRIPPER)
 """Names of all motors."""
 
 MAX_BYTES = 64_000
 """Maximum size of a calibration file."""
+
+MAX_OFFSET = 256 * TURN
+"""[ticks] Homing offset that no motor exceeds; an STS3215 has at most half a turn."""
 
 Ticks = Annotated[int, Meta(ge=-TURN, le=2 * TURN)]
 
@@ -32,27 +36,33 @@ class MotorCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         id: its number on the bus.
-        drive_mode: 1 if its angle counts in the other direction.
-        homing_offset: actual minus reported position [ticks]; the motor stores it too.
+        drive_mode: its lowest bit is 1 if the angle counts in the other direction. A Dynamixel
+            motor keeps it, with further bits, and turns its positions around itself.
+        homing_offset: offset of its zero [ticks]; the motor stores it too.
         range_min, range_max: extremes of its reported position [ticks].
     """
 
     id: Annotated[int, Meta(ge=0, le=MAX_ID)]
-    drive_mode: Annotated[int, Meta(ge=0, le=1)]
-    homing_offset: Annotated[int, Meta(gt=-TURN // 2, lt=TURN // 2)]
+    drive_mode: Annotated[int, Meta(ge=0, le=15)]
+    homing_offset: Annotated[int, Meta(gt=-MAX_OFFSET, lt=MAX_OFFSET)]
     range_min: Ticks
     range_max: Ticks
+
+    @property
+    def reverses(self) -> bool:
+        """True if the drive mode turns the angle around."""
+        return bool(self.drive_mode & 1)
 
     def angle(self, ticks: int) -> float:
         """Return the angle [rad] at the position ``ticks``; 0 is the middle of the range."""
         angle = (ticks - (self.range_min + self.range_max) / 2.0) * 2.0 * math.pi / TURN
-        return -angle if self.drive_mode else angle
+        return -angle if self.reverses else angle
 
     def fraction(self, ticks: int) -> float:
         """Return the position ``ticks`` as a fraction of the range, 0 to 1."""
         fraction = (ticks - self.range_min) / (self.range_max - self.range_min)
         fraction = min(max(fraction, 0.0), 1.0)
-        return 1.0 - fraction if self.drive_mode else fraction
+        return 1.0 - fraction if self.reverses else fraction
 
 
 Calibration = dict[str, MotorCalibration]

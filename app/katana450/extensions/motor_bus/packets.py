@@ -1,17 +1,11 @@
-"""Packets and registers of Feetech STS3215 servos.
-
-A packet is ``FF FF id length code parameters checksum``. Its code is an instruction from the host,
-or the error flags of a motor. Source: the memory table and protocol of Feetech's STS series.
-"""
+"""Packets on a bus of servos, and what the servos of a maker have in common."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from typing import NamedTuple
-
-HEADER = b"\xff\xff"
 
 BROADCAST = 0xFE
 """Id to which a request to several motors is addressed."""
@@ -23,9 +17,6 @@ MAX_LENGTH = 0x80
 """Highest value [bytes] of the length field that is taken for a packet; no request here is longer.
 """
 
-FIXED_BYTES = 6
-"""Bytes of a packet without parameters."""
-
 TURN = 4096
 """Ticks per turn."""
 
@@ -36,25 +27,12 @@ class Instruction(IntEnum):
     PING = 0x01
     READ = 0x02
     WRITE = 0x03
+    REBOOT = 0x08
+    """Start again, as after power-up. Only Dynamixel motors know it."""
     SYNC_READ = 0x82
     """Read the same registers of several motors, which answer one after the other."""
     SYNC_WRITE = 0x83
     """Set the same register of several motors, which do not answer."""
-
-
-class MotorError(IntFlag):
-    """The code of a packet from a motor; 0 without an error."""
-
-    VOLTAGE = 0x01
-    ANGLE = 0x02
-    OVERHEAT = 0x04
-    OVERCURRENT = 0x08
-    OVERLOAD = 0x20
-
-    @property
-    def words(self) -> str:
-        """The errors in words, such as "overheat, overload"; empty without one."""
-        return ", ".join(flag.name.lower() for flag in MotorError if flag in self and flag.name)
 
 
 class Register(NamedTuple):
@@ -64,11 +42,13 @@ class Register(NamedTuple):
         address: address of its first byte.
         size: number of bytes.
         sign_bit: number of the bit that is the sign of the other ones; None for values without one.
+        complement: whether it is a two's complement.
     """
 
     address: int
     size: int
     sign_bit: int | None = None
+    complement: bool = False
 
     def encoded(self, value: int) -> bytes:
         """Return the bytes of ``value``. Raises OverflowError if they cannot hold it."""
@@ -77,104 +57,164 @@ class Register(NamedTuple):
             if abs(value) >= limit:
                 raise OverflowError(f"{value} needs more than {self.sign_bit} bits.")
             value = limit - value if value < 0 else value
-        return value.to_bytes(self.size, "little")
+        return value.to_bytes(self.size, "little", signed=self.complement)
 
     def decoded(self, data: bytes) -> int:
         """Return the value of ``data``."""
-        value = int.from_bytes(data, "little")
+        value = int.from_bytes(data, "little", signed=self.complement)
         if self.sign_bit is None or not value >> self.sign_bit & 1:
             return value
         return -(value & ((1 << self.sign_bit) - 1))
 
-
-FIRMWARE, MODEL = Register(0, 2), Register(3, 2)
-"""Version of the firmware, with the major part in the low byte, and number of the model."""
-
-ID, BAUD = Register(5, 1), Register(6, 1)
-"""Kept without power, like all up to the mode. A motor whose LOCK is 1 forgets what is written."""
-
-MIN_POSITION, MAX_POSITION = Register(9, 2, 15), Register(11, 2, 15)
-"""[ticks] Range that a motor leaves for no goal. It keeps it without power."""
-
-HOMING_OFFSET = Register(31, 2, 11)
-"""Actual minus reported position [ticks]. The motor keeps it without power."""
-
-TORQUE_ENABLE, ACCELERATION = Register(40, 1), Register(41, 1)
-GOAL_POSITION = Register(42, 2, 15)
-"""[ticks]"""
-TORQUE_LIMIT = Register(48, 2)
-"""[1/1000 of the largest torque]"""
-LOCK = Register(55, 1)
-PRESENT_POSITION = Register(56, 2, 15)
-"""[ticks]"""
-PRESENT_SPEED = Register(58, 2, 15)
-"""[ticks/s]"""
-PRESENT_LOAD = Register(60, 2, 10)
-"""[1/1000 of the largest torque]"""
-PRESENT_VOLTAGE = Register(62, 1)
-"""[0.1 V]"""
-PRESENT_TEMPERATURE = Register(63, 1)
-"""[degrees C]"""
+    def in_block(self, data: bytes, start: int) -> int:
+        """Return its value in the bytes ``data`` of a memory from the address ``start`` on."""
+        return self.decoded(data[self.address - start :][: self.size])
 
 
 @dataclass(frozen=True)
 class Packet:
-    """A packet.
+    """A packet, without what frames it.
 
     Attributes:
         id: number of the motor, or BROADCAST.
-        code: instruction of the host, or error flags of the motor.
+        code: instruction of the host, or what a motor reports.
         parameters: the rest of its content.
+        status: whether a motor has sent it, if that can be seen.
     """
 
     id: int
     code: int
     parameters: bytes = b""
+    status: bool = False
+
+
+@dataclass(frozen=True)
+class Framing:
+    """The bytes of packets: header, id, length, code, parameters and check value.
+
+    Attributes:
+        header: first bytes of a packet.
+        word: number of bytes of length and check value, and of an address in a request.
+        check: returns the check value of the bytes before it.
+        stuffed: bytes of which the last one is repeated in a packet; empty for none.
+        status: first byte of the content of a packet that a motor has sent; None without one.
+    """
+
+    header: bytes
+    word: int
+    check: Callable[[bytes], int]
+    stuffed: bytes = b""
+    status: int | None = None
 
     @property
-    def encoded(self) -> bytes:
-        """The bytes of the packet."""
-        body = bytes((self.id, len(self.parameters) + 2, self.code)) + self.parameters
-        return HEADER + body + bytes((checksum(body),))
+    def head_bytes(self) -> int:
+        """Number of bytes before the content."""
+        return len(self.header) + 1 + self.word
+
+    def encoded(self, packet: Packet) -> bytes:
+        """Return the bytes of ``packet``."""
+        content = bytes((packet.code,)) + packet.parameters
+        if packet.status and self.status is not None:
+            content = bytes((self.status,)) + content
+        if self.stuffed:
+            content = content.replace(self.stuffed, self.stuffed + self.stuffed[-1:])
+        head = self.header + bytes((packet.id,)) + self.words(len(content) + self.word)
+        return head + content + self.words(self.check(head + content))
+
+    def size(self, data: bytearray, place: int) -> int:
+        """Return the size of the packet with the header at ``place``; 0 if none begins there."""
+        motor = data[place + len(self.header)]
+        length = int.from_bytes(data[place + self.head_bytes - self.word :][: self.word], "little")
+        right = motor <= BROADCAST and self.word < length <= MAX_LENGTH
+        return self.head_bytes + length if right else 0
+
+    def decoded(self, data: bytes) -> Packet | None:
+        """Return the packet of ``data``; None if its check value is wrong."""
+        content, value = data[self.head_bytes : -self.word], data[-self.word :]
+        if int.from_bytes(value, "little") != self.check(data[: -self.word]):
+            return None
+        if self.stuffed:
+            content = content.replace(self.stuffed + self.stuffed[-1:], self.stuffed)
+        status = len(content) > 1 and content[0] == self.status
+        content = content[status:]
+        return Packet(data[len(self.header)], content[0], content[1:], status)
+
+    def words(self, *values: int) -> bytes:
+        """Return addresses or sizes as in a request."""
+        return b"".join(value.to_bytes(self.word, "little") for value in values)
 
 
-def checksum(body: bytes) -> int:
-    """Return the checksum of the bytes between the header and the checksum."""
-    return ~sum(body) & 0xFF
+OVERLOADED = "is overloaded and has reduced its force. Take the load off"
+HOT = "is too hot. Support the arm, release it and let it cool"
+WRONG_VOLTAGE = "has too low or too high a voltage. Check the power supply"
+WRONG_CURRENT = "takes too much current. Take the load off"
+WRONG_SENSOR = "reports a fault of its sensor. Support the arm and release it"
+SHOCK = "reports an electric shock or too little power. Check the power supply and the cables"
+"""Ends of sentences about the errors of a motor."""
 
 
-def ping_request(motor: int) -> Packet:
-    """Return the request for a sign that ``motor`` is there."""
-    return Packet(motor, Instruction.PING)
+@dataclass(frozen=True)
+class ServoMake:
+    """The servos of one maker: the framing of their packets, their registers and units.
 
+    Attributes:
+        modes: operating modes in which a motor holds a position.
+        drive_mode: None if only the calibration knows the drive mode, and positions ignore it.
+        counts_turns: whether a position continues beyond one turn.
+        units: of position, speed, load, voltage and temperature: ticks, ticks/s, fraction of the
+            torque, V, degrees C.
+        settings, jaw_settings: values that are written before a motor of a joint, and that of a
+            jaw, holds.
+        force_limit, full_force: register of the largest force, and its value for all force.
+        errors: ends of sentences by the bits of the errors.
+        hardware_error: register of these bits; None if each answer has them.
+        alert, refusal: bits of an answer that tell that there are errors, and why a request is
+            refused; 0 without them.
+    """
 
-def read_request(motor: int, register: Register) -> Packet:
-    """Return the request for the value of ``register``."""
-    return Packet(motor, Instruction.READ, bytes((register.address, register.size)))
+    framing: Framing
+    firmware: Register
+    model: Register
+    id: Register
+    drive_mode: Register | None
+    mode: Register
+    homing_offset: Register
+    min_position: Register
+    max_position: Register
+    torque_enable: Register
+    goal_position: Register
+    position: Register
+    speed: Register
+    load: Register
+    voltage: Register
+    temperature: Register
+    units: tuple[float, float, float, float, float]
+    modes: tuple[int, ...]
+    counts_turns: bool
+    settings: tuple[tuple[Register, int], ...]
+    jaw_settings: tuple[tuple[Register, int], ...]
+    force_limit: Register
+    full_force: int
+    errors: Mapping[int, str]
+    hardware_error: Register | None = None
+    alert: int = 0
+    refusal: int = 0
 
+    @property
+    def measured(self) -> tuple[Register, ...]:
+        """The registers of a reading, in the order of the units."""
+        return self.position, self.speed, self.load, self.voltage, self.temperature
 
-def write_request(motor: int, register: Register, value: int) -> Packet:
-    """Return the request that sets ``register`` to ``value``."""
-    data = bytes((register.address,)) + register.encoded(value)
-    return Packet(motor, Instruction.WRITE, data)
-
-
-def sync_read_request(motors: tuple[int, ...], address: int, size: int) -> Packet:
-    """Return the request for ``size`` bytes from ``address`` on of all ``motors``."""
-    return Packet(BROADCAST, Instruction.SYNC_READ, bytes((address, size, *motors)))
-
-
-def sync_write_request(register: Register, values: Mapping[int, int]) -> Packet:
-    """Return the request that sets ``register`` to the ``values`` by the ids of the motors."""
-    rows = (bytes((motor,)) + register.encoded(value) for motor, value in values.items())
-    head = bytes((register.address, register.size))
-    return Packet(BROADCAST, Instruction.SYNC_WRITE, head + b"".join(rows))
+    def sentence(self, errors: int) -> str:
+        """Return the end of the sentence about the first of the bits ``errors``; empty for none."""
+        return next((text for bit, text in self.errors.items() if errors & bit), "")
 
 
 class PacketReader:
     """Finds packets in a stream of bytes, however it is split, and skips all other bytes."""
 
-    def __init__(self) -> None:
+    def __init__(self, framing: Framing) -> None:
+        self._framing = framing
         self._rest = bytearray()
 
     def clear(self) -> None:
@@ -184,20 +224,19 @@ class PacketReader:
     def feed(self, data: bytes) -> list[Packet]:
         """Return the packets that ``data`` completes."""
         self._rest += data
-        packets, place, rest = [], 0, self._rest
-        while (place := rest.find(HEADER, place)) >= 0 and len(rest) - place >= FIXED_BYTES:
-            motor, length = rest[place + 2], rest[place + 3]
-            end = place + 4 + length
-            if motor <= BROADCAST and 2 <= length <= MAX_LENGTH:
-                if end > len(rest):
+        framing, packets, place, rest = self._framing, [], 0, self._rest
+        header, least = framing.header, framing.head_bytes + framing.word + 1
+        while (place := rest.find(header, place)) >= 0 and len(rest) - place >= least:
+            if size := framing.size(rest, place):
+                if place + size > len(rest):
                     break
-                body = bytes(rest[place + 2 : end - 1])
-                if rest[end - 1] == checksum(body):
-                    packets.append(Packet(motor, body[2], body[3:]))
-                    place = end
+                packet = framing.decoded(bytes(rest[place : place + size]))
+                if packet is not None:
+                    packets.append(packet)
+                    place += size
                     continue
             # The header may be part of garbage.
             place += 1
-        # The last byte may be the first half of a header.
-        del rest[: place if place >= 0 else max(len(rest) - 1, 0)]
+        # The last bytes may begin a header.
+        del rest[: place if place >= 0 else max(len(rest) - len(header) + 1, 0)]
         return packets

@@ -14,6 +14,9 @@ from katana450.cli.option_values import number, port
 from katana450.errors import ConfigurationError
 from katana450.extensions.real_arm.link import PORT
 
+SERVO_DRIVERS = ("so101", "koch", "omx")
+"""Names of the arms of bus servos."""
+
 if TYPE_CHECKING:
     from katana450.arm.drivers.driver import Driver
     from katana450.arm.robot.robot import Robot
@@ -24,16 +27,20 @@ if TYPE_CHECKING:
 def add_emulate_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 emulate`` to ``parser``."""
     parser.description = (
-        "Emulate the firmware of a Katana450 behind a TCP port, or the motors of an SO-101 behind "
-        "a TCP port and a pseudo-terminal. It begins as an arm after power-up: a Katana450 is not "
-        "calibrated, and motors are off."
+        "Emulate the firmware of a Katana450 behind a TCP port, or the motors of an SO-101, Koch "
+        "or OMX behind a TCP port and a pseudo-terminal. It begins as an arm after power-up: a "
+        "Katana450 is not calibrated, and motors are off."
     )
     parser.add_argument(
-        "emulated", nargs="?", choices=("katana450", "so101"), default="katana450", help="the arm"
+        "emulated",
+        nargs="?",
+        choices=("katana450", *SERVO_DRIVERS),
+        default="katana450",
+        help="the arm",
     )
     parser.add_argument("--port", type=port, help=f"0 for any free port (default: {PORT} or 5567)")
     parser.add_argument(
-        "--calibration", type=Path, metavar="FILE", help="so101: write its calibration there"
+        "--calibration", type=Path, metavar="FILE", help="write the calibration of its motors there"
     )
     parser.add_argument(
         "--calibrated", action="store_true", help="begin calibrated and holding, for tests"
@@ -60,7 +67,20 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         "--calibration",
         type=Path,
         metavar="FILE",
-        help="calibration of an SO-100 or SO-101 at --device, a JSON file of LeRobot",
+        help="calibration of the bus servos at --device, a JSON file of LeRobot",
+    )
+    parser.add_argument(
+        "--driver",
+        choices=SERVO_DRIVERS,
+        help="the arm of bus servos at --device, with any description of five joints and a gripper "
+        "(default: so101 with --calibration)",
+    )
+    parser.add_argument(
+        "--reversed",
+        action="append",
+        default=[],
+        metavar="MOTOR",
+        help="a motor that turns against the joint of the description; may be given several times",
     )
     parser.add_argument(
         "--arm-log", type=Path, metavar="FILE", help="write all exchanges with a Katana450 there"
@@ -73,14 +93,14 @@ def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> D
     q: (n,) [rad] and gripper [rad] are reported before the first measurement. Raises KatanaError.
     """
     if options.device is None:
-        for name in ("arm_log", "calibration"):
-            if getattr(options, name) is not None:
+        for name in ("arm_log", "calibration", "driver", "reversed"):
+            if getattr(options, name):
                 option = "--" + name.replace("_", "-")
                 raise ConfigurationError(f"{option} needs a real arm: add --device ADDRESS.")
         return None
     from katana450.extensions.motor_bus.calibration import AXES
 
-    if options.calibration is not None or tuple(robot.require_arm().chain.names) == AXES:
+    if options.calibration or options.driver or tuple(robot.require_arm().chain.names) == AXES:
         from katana450.extensions.real_arm.servo import driver as servo
 
         return servo.driver_of(options, robot, q, gripper)

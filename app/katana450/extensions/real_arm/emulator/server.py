@@ -23,6 +23,7 @@ from katana450.extensions.real_arm.codec.codecs import FirmwareCodec
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm, loads_of_robot
 from katana450.extensions.real_arm.emulator.firmware import Firmware
 from katana450.extensions.real_arm.link import PORT
+from katana450.extensions.real_arm.servo.arms import SERVO_ARMS
 from katana450.extensions.real_arm.servo.emulated_servos import EmulatedServos, calibration_text
 from katana450.platform_support import raise_priority, stop_signals
 from katana450.sdk import listen
@@ -190,7 +191,7 @@ class EmulatorServer(DeviceServer[EmulatedArm]):
 
 
 class ServoServer(DeviceServer[EmulatedServos]):
-    """Serves the motors of an emulated SO-101, at a port and at a pseudo-terminal."""
+    """Serves the motors of an emulated arm, at a port and at a pseudo-terminal."""
 
     has_terminal = True
 
@@ -208,10 +209,11 @@ def emulate(options: Namespace) -> int:
     for number in stop_signals():
         signal.signal(number, lambda *_: ending.set())
     emulator: EmulatorServer | ServoServer
-    if options.emulated == "so101":
+    if (servo_arm := SERVO_ARMS.get(options.emulated)) is not None:
         if options.calibration is not None:
-            write_files({options.calibration: writer_of(calibration_text())})
-        emulator = ServoServer(EmulatedServos(), BUS_PORT if options.port is None else options.port)
+            write_files({options.calibration: writer_of(calibration_text(servo_arm))})
+        bus_port = BUS_PORT if options.port is None else options.port
+        emulator = ServoServer(EmulatedServos(servo_arm), bus_port)
     else:
         arm = EmulatedArm(
             loads=loads_of_robot(load()),

@@ -1,1 +1,1 @@
-"""Arms of bus servos, SO-100 and SO-101: their joints, their driver and an emulator."""
+"""Arms of bus servos: their joints, their driver and an emulator."""

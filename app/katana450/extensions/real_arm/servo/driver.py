@@ -1,4 +1,4 @@
-"""The driver of an SO-100 or SO-101: a thread of its own exchanges packets with its motors."""
+"""The driver of an arm of bus servos: a thread of its own exchanges packets with its motors."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 
 from katana450.arm.control.state.arm_report import ArmAct
 from katana450.arm.robot.robot import Robot
-from katana450.errors import ConfigurationError
+from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.device_address import DeviceAddress
-from katana450.extensions.motor_bus import packets as reg
 from katana450.extensions.motor_bus.bus import (
     PORT,
     BusLostError,
     MotorBus,
-    SilentMotorError,
+    MotorRequestError,
     check_calibration,
     open_port,
 )
 from katana450.extensions.motor_bus.calibration import GRIPPER, MOTORS, read_calibration
 from katana450.extensions.real_arm.driver_thread import SHORTEST_RETRY, DriverThread
+from katana450.extensions.real_arm.servo.arms import SERVO_ARMS
 from katana450.extensions.real_arm.servo.joints import ServoJoints
 from katana450.extensions.real_arm.servo.machine import SILENT_TIME, Readings, ServoMachine
 from katana450.extensions.real_arm.tool_travel import Travel, tool_travel
@@ -33,30 +33,9 @@ PERIOD = 0.01
 TORQUE_PERIOD = 0.25
 """[s] Time between two questions whether the motors still hold the arm."""
 
-BLOCK = (
-    reg.PRESENT_POSITION,
-    reg.PRESENT_SPEED,
-    reg.PRESENT_LOAD,
-    reg.PRESENT_VOLTAGE,
-    reg.PRESENT_TEMPERATURE,
-)
-"""Registers that follow one another and are read at once."""
-
-START = BLOCK[0].address
-SIZE = sum(register.size for register in BLOCK)
-
-UNITS = np.array((1.0, 1.0, 1e-3, 0.1, 1.0))
-"""Units of these registers: ticks, ticks/s, fraction of the torque, V, degrees C."""
-
-JAW_LIMIT, FULL_LIMIT = 500, 1000
-"""[1/1000] The jaw presses with half of its force, as LeRobot lets it."""
-
-ACCELERATION = 254
-"""[100 ticks/s^2] The largest value: the setpoints are smooth."""
-
 
 class ServoDriver(DriverThread[ServoMachine, MotorBus]):
-    """An SO-100 or SO-101 behind the protocol of drivers."""
+    """An arm of bus servos behind the protocol of drivers."""
 
     def __init__(
         self,
@@ -73,10 +52,14 @@ class ServoDriver(DriverThread[ServoMachine, MotorBus]):
         super().__init__(ServoMachine(joints, start, travel), str(address))
         self._port, self._joints = address, joints
         self._due = self._torque_due = 0.0
+        self._turns = np.zeros(len(MOTORS), np.int64)
+        registers = self._joints.arm.make.measured
+        self._start = min(register.address for register in registers)
+        self._size = max(register.address + register.size for register in registers) - self._start
 
     def _open(self) -> MotorBus:
         """Return the bus, on which are the motors of the calibration. Raises KatanaError."""
-        bus = MotorBus(open_port(self._port, "the arm"))
+        bus = MotorBus(open_port(self._port, "the arm"), self._joints.arm.make)
         try:
             self._identify(bus)
         except Exception:
@@ -91,9 +74,14 @@ class ServoDriver(DriverThread[ServoMachine, MotorBus]):
             others = bus.scan(set(range(1, 21)) - set(joints.ids)) if len(missing) < 6 else ()
             names = ", ".join(self._machine.name(motor) for motor in sorted(missing))
             hint = f" A motor answers as id {others[0]}: give it its own id." if others else ""
-            raise SilentMotorError(f"No answer of {names}.{hint} Check power and cables.")
-        for name in MOTORS:
+            raise MotorRequestError(f"No answer of {names}.{hint} Check power and cables.")
+        for name, motor in zip(MOTORS, joints.ids, strict=True):
             check_calibration(bus, name, joints.calibration[name])
+            if (mode := bus.read(motor, bus.make.mode)) not in bus.make.modes:
+                raise InputError(
+                    f"{name} is in operating mode {mode}, in which it holds no position. Run "
+                    "`lerobot-calibrate`, which sets it."
+                )
 
     def _work(self, link: MotorBus, now: float) -> float:
         """Send the goals and read the motors, at once for a stop."""
@@ -102,32 +90,38 @@ class ServoDriver(DriverThread[ServoMachine, MotorBus]):
             return self._due - now
         self._due = max(self._due + PERIOD, now)
         if goals := machine.goals():
-            link.write_all(reg.GOAL_POSITION, goals)
-        self._read(link)
+            turns = dict(zip(self._joints.ids, self._turns.tolist(), strict=True))
+            raw = {motor: goal + turns[motor] for motor, goal in goals.items()}
+            link.write_all(link.make.goal_position, raw)
         try:
+            self._read(link)
             if machine.acts:
                 self._perform(link, machine.acts.popleft())
             elif machine.mode.follows and now >= self._torque_due:
                 self._torque_due = now + TORQUE_PERIOD
                 self._check_torque(link)
-        except SilentMotorError as error:
+        except MotorRequestError as error:
             machine.fail(str(error))
         return 0.0
 
     def _read(self, bus: MotorBus) -> None:
-        ids, start = self._joints.ids, self._clock()
-        packets = bus.blocks(ids, START, SIZE)
+        ids, start, make = self._joints.ids, self._clock(), bus.make
+        packets = bus.blocks(ids, self._start, self._size)
         now = self._clock()
         if len(packets) == len(ids):
             self._retry, self._machine.round_trip = SHORTEST_RETRY, now - start
             answers = [packets[motor] for motor in ids]
             rows = [
-                [r.decoded(answer.parameters[r.address - START :][: r.size]) for r in BLOCK]
+                [register.in_block(answer.parameters, self._start) for register in make.measured]
                 for answer in answers
             ]
-            ticks, speeds, loads, volts, celsius = (np.array(rows) * UNITS).T
-            errors = tuple(reg.MotorError(answer.code) for answer in answers)
+            ticks, speeds, loads, volts, celsius = (np.array(rows) * make.units).T
+            errors = tuple(map(bus.reported, answers))
             t, places = 0.5 * (start + now), ticks.astype(np.int64)
+            if not self._machine.mode.follows:
+                # A motor that was reset counts within one turn again.
+                self._turns = self._joints.turns(places)
+            places -= self._turns
             self._machine.measured(Readings(t, places, speeds, loads, volts, celsius, errors))
         elif packets:
             self._machine.silent([motor for motor in ids if motor not in packets], now)
@@ -136,22 +130,27 @@ class ServoDriver(DriverThread[ServoMachine, MotorBus]):
 
     def _perform(self, bus: MotorBus, act: ArmAct) -> None:
         """Let the motors hold the arm where it is, or switch them off."""
-        joints, machine = self._joints, self._machine
+        ids, machine, make = self._joints.ids, self._machine, bus.make
         if act is ArmAct.RELEASE:
-            for motor in joints.ids:
-                bus.write(motor, reg.TORQUE_ENABLE, 0)
+            for motor in ids:
+                bus.write(motor, make.torque_enable, 0)
             machine.released()
             return
-        places = {motor: bus.read(motor, reg.PRESENT_POSITION) for motor in joints.ids}
-        for name, motor in zip(MOTORS, joints.ids, strict=True):
-            bus.write(motor, reg.TORQUE_LIMIT, JAW_LIMIT if name == GRIPPER else FULL_LIMIT)
-            bus.write(motor, reg.ACCELERATION, ACCELERATION)
-            bus.write(motor, reg.GOAL_POSITION, places[motor])
-            bus.write(motor, reg.TORQUE_ENABLE, 1)
-        machine.engaged(self._clock())
+        for motor in ids:
+            if make.hardware_error is not None and bus.read(motor, make.hardware_error):
+                bus.reboot(motor, ids)
+        places = [bus.read(motor, make.position) for motor in ids]
+        for name, motor, place in zip(MOTORS, ids, places, strict=True):
+            for register, value in make.jaw_settings if name == GRIPPER else make.settings:
+                bus.write(motor, register, value)
+            bus.write(motor, make.goal_position, place)
+            bus.write(motor, make.torque_enable, 1)
+        self._turns = self._joints.turns(np.array(places))
+        machine.engaged(self._clock(), np.array(places) - self._turns)
 
     def _check_torque(self, bus: MotorBus) -> None:
-        blocks = bus.blocks(self._joints.ids, reg.TORQUE_ENABLE.address, reg.TORQUE_ENABLE.size)
+        register = bus.make.torque_enable
+        blocks = bus.blocks(self._joints.ids, register.address, register.size)
         limp = [motor for motor, packet in blocks.items() if not packet.parameters[0]]
         if limp:
             name = self._machine.name(limp[0])
@@ -168,9 +167,12 @@ def driver_of(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -
     address = DeviceAddress.parse(options.device, PORT)
     if address.port is None:
         require("serial", "serial", "Serial ports")
+    arm = SERVO_ARMS[options.driver or "so101"]
     if options.calibration is None:
-        raise ConfigurationError("An SO-100 or SO-101 needs --calibration FILE, that of LeRobot.")
+        name = arm.name[0].upper() + arm.name[1:]
+        raise ConfigurationError(f"{name} needs --calibration FILE, that of LeRobot.")
     if options.arm_log is not None:
         raise ConfigurationError("--arm-log is for a Katana450 alone.")
-    joints = ServoJoints(read_calibration(options.calibration), robot)
+    calibration = read_calibration(options.calibration)
+    joints = ServoJoints(calibration, robot, arm, options.reversed)
     return ServoDriver(address, joints, np.array([*q, gripper]), tool_travel(robot))

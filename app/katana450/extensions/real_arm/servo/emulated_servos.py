@@ -1,4 +1,4 @@
-"""The emulated motors of an SO-101: their memory, their motion, and faults for tests."""
+"""The emulated motors of an arm: their memory, their motion, and faults for tests."""
 
 from __future__ import annotations
 
@@ -8,9 +8,24 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 
-from katana450.extensions.motor_bus import packets as reg
 from katana450.extensions.motor_bus.calibration import MOTORS, MotorCalibration
-from katana450.extensions.motor_bus.packets import Instruction, MotorError, Packet, Register
+from katana450.extensions.motor_bus.dynamixel import (
+    ACCESS_ERROR,
+    CURRENT_POSITION_MODE,
+    DYNAMIXEL,
+    EXTENDED_POSITION_MODE,
+    KEPT_BYTES,
+    SHUTDOWN,
+)
+from katana450.extensions.motor_bus.packets import (
+    BROADCAST,
+    TURN,
+    Instruction,
+    Packet,
+    PacketReader,
+    Register,
+)
+from katana450.extensions.real_arm.servo.arms import SERVO_ARMS, ServoArm
 
 STEP = 0.002
 """[s] Longest step."""
@@ -32,27 +47,35 @@ FALL = 600.0
 
 VOLTS, CELSIUS = 7.4, 30.0
 
-MODEL_STS3215, FIRMWARE_3_10 = 777, 0x0A03
+FIRMWARE = 0x0A03
 
-# Counted with the homing offsets below, which a calibration can change.
-RANGES = ((730, 3410), (900, 3180), (900, 3180), (960, 3140), (0, 4095), (2020, 3330))
-"""[ticks] Mechanical range of each motor."""
+STOPS = ((730, 3410), (900, 3180), (900, 3180), (960, 3140), (0, 4095), (2020, 3330))
+"""[ticks] Mechanical range of each motor, counted with the homing offsets below, which a
+calibration can change."""
 
 OFFSETS = (-37, 1200, 0, -2047, 15, 2047)
-"""[ticks] Homing offset of each motor."""
+"""[ticks] Homing offset of each motor. Two of a Dynamixel arm begin beyond one turn."""
 
 START = (2070, 1000, 3100, 2600, 2047, 2100)
 """[ticks] The arm is folded."""
 
+SHUTDOWN_ERRORS = 0x34
+"""Errors at which a Dynamixel motor goes limp, as delivered: heat, shock, overload."""
 
-def calibration_text() -> bytes:
-    """Return the calibration of the emulated arm as LeRobot writes it."""
-    motors = {
-        name: MotorCalibration(number, 0, offset, *ends)
-        for number, (name, offset, ends) in enumerate(
-            zip(MOTORS, OFFSETS, RANGES, strict=True), start=1
-        )
-    }
+REBOOT_TIME = 0.1
+"""[s] Time for which a motor that starts again does not answer. Assumed."""
+
+
+def calibration_of(arm: ServoArm, number: int) -> MotorCalibration:
+    """Return the calibration of the motor ``number``, from 0, of an emulated ``arm``."""
+    whole = number in arm.whole_turns
+    offset, ends = (0, (0, TURN - 1)) if whole else (OFFSETS[number], STOPS[number])
+    return MotorCalibration(arm.first_id + number, 0, offset, *ends)
+
+
+def calibration_text(arm: ServoArm = SERVO_ARMS["so101"]) -> bytes:
+    """Return the calibration of an emulated ``arm`` as LeRobot writes it."""
+    motors = {name: calibration_of(arm, number) for number, name in enumerate(MOTORS)}
     return msgspec.json.format(msgspec.json.encode(motors), indent=4)
 
 
@@ -62,31 +85,39 @@ class EmulatedServo:
     Attributes:
         place, speed: where it is [ticks], counted with its OFFSETS, and how fast [ticks/s].
         blocked, silent: whether something blocks it, and whether it does not answer.
-        fault: errors that it reports.
+        fault: bits of the errors that it has. A Dynamixel motor reports them until it is rebooted.
         volts, celsius: its supply [V] and its temperature [degrees C].
+        make: its registers.
     """
 
-    def __init__(self, number: int) -> None:
-        """Create the motor of that ``number``, from 0, with its torque off."""
+    def __init__(self, number: int, arm: ServoArm = SERVO_ARMS["so101"]) -> None:
+        """Create the motor of that ``number``, from 0, of ``arm``, with its torque off."""
         self.place, self.speed = float(START[number]), 0.0
-        self._load = 0.0
+        self._load = self._unready = 0.0
         self.blocked = self.silent = False
-        self.fault = MotorError(0)
+        self.fault = 0
         self.volts, self.celsius = VOLTS, CELSIUS
-        self._ends, self._sag, self._offset = RANGES[number], SAG[number], OFFSETS[number]
-        self._memory = bytearray(128)
+        calibration = calibration_of(arm, number)
+        self.make, self._offset = arm.make, calibration.homing_offset
+        self._ends, self._sag, self._shift = STOPS[number], SAG[number], 0
+        self._memory = bytearray(256)
+        make = self.make
         for register, value in (
-            (reg.FIRMWARE, FIRMWARE_3_10),
-            (reg.MODEL, MODEL_STS3215),
-            (reg.ID, number + 1),
-            (reg.MIN_POSITION, self._ends[0]),
-            (reg.MAX_POSITION, self._ends[1]),
-            (reg.HOMING_OFFSET, OFFSETS[number]),
-            (reg.GOAL_POSITION, START[number]),
-            (reg.TORQUE_LIMIT, 1000),
-            (reg.LOCK, 1),
+            (make.firmware, FIRMWARE % 256**make.firmware.size),
+            (make.model, arm.models[number]),
+            (make.id, calibration.id),
+            (make.min_position, calibration.range_min),
+            (make.max_position, calibration.range_max),
+            (make.homing_offset, self._offset),
+            (make.goal_position, START[number]),
+            (make.force_limit, make.full_force),
         ):
             self[register] = value
+        if make is DYNAMIXEL:
+            self[make.mode] = EXTENDED_POSITION_MODE
+            self[SHUTDOWN] = SHUTDOWN_ERRORS
+            self.reboot()
+            self._unready = 0.0
 
     def __getitem__(self, register: Register) -> int:
         """Return the value of ``register``."""
@@ -105,18 +136,49 @@ class EmulatedServo:
         self._memory[address : address + len(data)] = data[: max(len(self._memory) - address, 0)]
 
     @property
+    def answers(self) -> bool:
+        """True if it answers."""
+        return not self.silent and self._unready <= 0.0
+
+    @property
+    def code(self) -> int:
+        """The error code of its answers."""
+        register = self.make.hardware_error
+        if register is None:
+            return self.fault
+        return self.make.alert if self[register] else 0
+
+    @property
     def counted(self) -> float:
-        """Where it is [ticks], counted from its homing offset within one turn."""
-        return (self.place + self._offset - self[reg.HOMING_OFFSET]) % reg.TURN
+        """Where it is [ticks], counted from its homing offset, or within one turn."""
+        homing = self[self.make.homing_offset]
+        if self.make is DYNAMIXEL:
+            return self.place - self._offset + homing - self._shift
+        return (self.place + self._offset - homing) % TURN
+
+    def reboot(self) -> None:
+        """Start again: limp, without errors, and counting within one turn."""
+        self._unready = REBOOT_TIME
+        self._shift = TURN * math.floor((self.place - self._offset) / TURN)
+        self[self.make.torque_enable] = 0
+        if self.make.hardware_error is not None:
+            self[self.make.hardware_error] = 0
+        self[self.make.goal_position] = round(self.counted)
 
     def step(self, dt: float) -> None:
         """Move for ``dt`` [s]."""
-        lower, upper = self._ends
-        weight = self._sag * math.cos((self.place - 0.5 * (lower + upper)) * math.tau / reg.TURN)
-        holds = self[reg.TORQUE_ENABLE]
-        goal = min(max(self[reg.GOAL_POSITION], self[reg.MIN_POSITION]), self[reg.MAX_POSITION])
+        make, (lower, upper) = self.make, self._ends
+        self._unready -= dt
+        if make.hardware_error is not None and self.fault:
+            self[make.hardware_error] |= self.fault
+            if self.fault & self[SHUTDOWN]:
+                self[make.torque_enable] = 0
+        weight = self._sag * math.cos((self.place - 0.5 * (lower + upper)) * math.tau / TURN)
+        holds, goal = self[make.torque_enable], self[make.goal_position]
+        if self[make.mode] not in (EXTENDED_POSITION_MODE, CURRENT_POSITION_MODE):
+            goal = min(max(goal, self[make.min_position]), self[make.max_position])
         behind = goal - self.counted + weight if holds else 0.0
-        force = self[reg.TORQUE_LIMIT] / 1000.0
+        force = self[make.force_limit] / make.full_force
         load = min(max(behind / STALL_ERROR, -force), force)
         wanted = GAIN * behind if holds else FALL * weight / max(SAG)
         wanted = min(max(wanted, -MAX_SPEED), MAX_SPEED)
@@ -130,14 +192,16 @@ class EmulatedServo:
 
     def publish(self) -> None:
         """Write what was measured into the memory."""
-        for register, value in (
-            (reg.PRESENT_POSITION, round(self.counted) % reg.TURN),
-            (reg.PRESENT_SPEED, self.speed),
-            (reg.PRESENT_LOAD, 1000.0 * self._load),
-            (reg.PRESENT_VOLTAGE, 10.0 * self.volts),
-            (reg.PRESENT_TEMPERATURE, self.celsius),
-        ):
-            self[register] = round(value)
+        make, counted = self.make, round(self.counted)
+        values = (
+            counted if make.counts_turns else counted % TURN,
+            self.speed,
+            self._load,
+            self.volts,
+            self.celsius,
+        )
+        for register, value, unit in zip(make.measured, values, make.units, strict=True):
+            self[register] = round(value / unit)
 
 
 class EmulatedServos:
@@ -148,11 +212,12 @@ class EmulatedServos:
         lost: fraction of the answers that lose a byte.
     """
 
-    def __init__(self) -> None:
-        """Create an arm that is folded, with its motors off."""
-        self.motors = tuple(map(EmulatedServo, range(len(MOTORS))))
+    def __init__(self, arm: ServoArm = SERVO_ARMS["so101"]) -> None:
+        """Create an ``arm`` that is folded, with its motors off."""
+        self.motors = tuple(EmulatedServo(number, arm) for number in range(len(MOTORS)))
         self.lost = 0.0
-        self._reader = reg.PacketReader()
+        self._make, self._framing = arm.make, arm.make.framing
+        self._reader = PacketReader(self._framing)
         self._random = np.random.default_rng(1)
         self.step(STEP)
 
@@ -168,39 +233,43 @@ class EmulatedServos:
         """Yield the answers to the requests that ``data`` completes."""
         for request in self._reader.feed(data):
             for answer in self._answers(request):
-                reply = answer.encoded
+                reply = self._framing.encoded(answer)
                 if self._random.random() < self.lost:
                     cut = int(self._random.integers(len(reply)))
                     reply = reply[:cut] + reply[cut + 1 :]
                 yield reply
 
     def _answers(self, request: Packet) -> Iterator[Packet]:
-        data = request.parameters
-        match request.code:
-            case Instruction.SYNC_READ if len(data) > 2:
-                for motor in self._named(*data[2:]):
-                    yield self._answer(motor, motor.read(data[0], data[1]))
-            case Instruction.SYNC_WRITE if len(data) > 2:
-                for place in range(2, len(data) - data[1], data[1] + 1):
-                    for motor in self._named(data[place]):
-                        motor.write(data[0], data[place + 1 : place + 1 + data[1]])
-            case Instruction.READ if len(data) == 2:
-                for motor in self._named(request.id):
-                    yield self._answer(motor, motor.read(data[0], data[1]))
-            case Instruction.WRITE if data:
-                for motor in self._named(request.id):
-                    yield self._answer(motor)
-                    motor.write(data[0], data[1:])
-            case Instruction.PING:
-                yield from map(self._answer, self._named(request.id))
+        make, word, data = self._make, self._framing.word, request.parameters
+        first, second = (int.from_bytes(data[k : k + word], "little") for k in (0, word))
+        rest = data[2 * word :]
+        if request.code == Instruction.SYNC_WRITE:
+            for place in range(0, len(rest) - second, second + 1):
+                for motor in self._named(rest[place]):
+                    motor.write(first, rest[place + 1 :][:second])
+            return
+        ids = rest if request.code == Instruction.SYNC_READ else (request.id,)
+        for motor in self._named(*ids):
+            values, refusal = b"", 0
+            match request.code:
+                case Instruction.READ | Instruction.SYNC_READ:
+                    values = motor.read(first, second)
+                case Instruction.WRITE if first < KEPT_BYTES and motor[make.torque_enable]:
+                    refusal = ACCESS_ERROR & make.refusal
+                case Instruction.PING if make is DYNAMIXEL:
+                    values = motor.read(make.model.address, 2) + motor.read(
+                        make.firmware.address, 1
+                    )
+            yield Packet(motor[make.id], motor.code | refusal, values, status=True)
+            if request.code == Instruction.WRITE and not refusal:
+                motor.write(first, data[word:])
+            elif request.code == Instruction.REBOOT:
+                motor.reboot()
 
     def _named(self, *ids: int) -> list[EmulatedServo]:
         """Return the motors that answer and have one of the ``ids``."""
         return [
             motor
             for motor in self.motors
-            if not motor.silent and {motor[reg.ID], reg.BROADCAST} & {*ids}
+            if motor.answers and {motor[self._make.id], BROADCAST} & {*ids}
         ]
-
-    def _answer(self, motor: EmulatedServo, data: bytes = b"") -> Packet:
-        return Packet(motor[reg.ID], int(motor.fault), data)

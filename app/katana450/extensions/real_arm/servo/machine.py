@@ -14,7 +14,6 @@ import numpy as np
 from katana450.arm.control.state.arm_report import ArmAct, ArmMode, ArmReport, MeasuredStop
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.extensions.motor_bus.calibration import MOTORS
-from katana450.extensions.motor_bus.packets import MotorError
 from katana450.extensions.real_arm.arm_modes import ArmModes
 from katana450.extensions.real_arm.servo.joints import ServoJoints
 from katana450.extensions.real_arm.tool_travel import Travel
@@ -55,20 +54,12 @@ LAST_WRITES = 3
 MAX_ASTRAY = np.radians(17.0)
 """[rad] Distance of a joint beyond its limits that no correct calibration gives."""
 
-ERRORS = {
-    MotorError.OVERLOAD: "is overloaded and has reduced its force. Take the load off",
-    MotorError.OVERHEAT: "is too hot. Support the arm, release it and let it cool",
-    MotorError.VOLTAGE: "has too low or too high a voltage. Check the power supply",
-    MotorError.OVERCURRENT: "takes too much current. Take the load off",
-    MotorError.ANGLE: "reports a fault of its sensor. Support the arm and release it",
-}
-"""Ends of sentences about the errors of a motor."""
-
 
 class Readings(NamedTuple):
     """One reading of all motors: ticks, ticks/s, fractions of the torque, V, degrees C: (6,) each.
 
     t: time of the reading [s].
+    errors: the bits of the errors of the motors.
     """
 
     t: float
@@ -77,7 +68,7 @@ class Readings(NamedTuple):
     loads: FloatArray
     volts: FloatArray
     celsius: FloatArray
-    errors: tuple[MotorError, ...]
+    errors: tuple[int, ...]
 
 
 class ServoMachine(ArmModes):
@@ -182,10 +173,11 @@ class ServoMachine(ArmModes):
             motor: goal for motor, goal in zip(ids, ticks, strict=True) if motor not in self._apart
         }
 
-    def engaged(self, now: float) -> None:
-        """Note that the motors hold the arm where it was measured."""
+    def engaged(self, now: float, ticks: IntArray) -> None:
+        """Note that the motors hold the arm at ``ticks`` (6,)."""
         self.mode, self.note = ArmMode.HOLDING, ""
         self._apart, self._writes, self._stopped = frozenset(), np.inf, True
+        self._place = self._joints.joints(ticks)
         self._goal, self.hurries = self._place, False
         self._heard = dict.fromkeys(self._heard, now)
         self._stalled[:] = np.inf
@@ -233,7 +225,7 @@ class ServoMachine(ArmModes):
     def _supervise(self, readings: Readings, beyond: FloatArray) -> None:
         """Compare a reading with the mode. ``beyond`` (6,): angles beyond the limits [rad]."""
         for number, errors in enumerate(readings.errors):
-            text = next((text for error, text in ERRORS.items() if error in errors), "")
+            text = self._joints.arm.make.sentence(errors)
             if text and self.mode is not ArmMode.FAULT:
                 values = f"{readings.volts[number]:.1f} V, {readings.celsius[number]:.0f} °C"
                 self.fail(f"{self.name(self._joints.ids[number])} {text} ({values}).")

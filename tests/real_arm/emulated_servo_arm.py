@@ -1,4 +1,4 @@
-"""An emulated SO-101 on a real socket, and its driver in a control loop."""
+"""An emulated arm of bus servos on a real socket, and its driver in a control loop."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.motor_bus.calibration import Calibration, decoded_calibration
 from katana450.extensions.real_arm.emulator.server import ServoServer
+from katana450.extensions.real_arm.servo.arms import SERVO_ARMS, ServoArm
 from katana450.extensions.real_arm.servo.driver import ServoDriver
 from katana450.extensions.real_arm.servo.emulated_servos import EmulatedServos, calibration_text
 from katana450.extensions.real_arm.servo.joints import ServoJoints
@@ -25,8 +26,11 @@ PATIENCE = 15.0
 """[s] For anything that a loaded machine may do late."""
 
 
-def calibration() -> Calibration:
-    return decoded_calibration(calibration_text())
+SO101 = SERVO_ARMS["so101"]
+
+
+def calibration(kind: ServoArm = SO101) -> Calibration:
+    return decoded_calibration(calibration_text(kind))
 
 
 def so101() -> Robot:
@@ -34,8 +38,8 @@ def so101() -> Robot:
 
 
 @contextmanager
-def served() -> Iterator[ServoServer]:
-    server = ServoServer(EmulatedServos())
+def served(kind: ServoArm = SO101) -> Iterator[ServoServer]:
+    server = ServoServer(EmulatedServos(kind))
     server.start()
     try:
         yield server
@@ -49,9 +53,10 @@ def driven(
     robot: Robot,
     address: DeviceAddress | None = None,
     own: Calibration | None = None,
+    kind: ServoArm = SO101,
 ) -> Iterator[SmallLoop]:
     """Yield a loop with the driver of the arm of ``server``, which is not connected."""
-    joints = ServoJoints(own or calibration(), robot)
+    joints = ServoJoints(own or calibration(kind), robot, kind)
     address = address or DeviceAddress("127.0.0.1", server.port)
     loop = SmallLoop(ServoDriver(address, joints, np.zeros(6), tool_travel(robot)))
     try:
