@@ -22,14 +22,6 @@ from katana450.extensions.device_address import DeviceAddress
 from katana450.extensions.motor_bus import bus
 from katana450.extensions.motor_bus.bus import MotorBus, MotorRequestError, open_port
 from katana450.extensions.motor_bus.dynamixel import DYNAMIXEL
-from katana450.extensions.motor_bus.packets import (
-    HOT,
-    OVERLOADED,
-    SHOCK,
-    WRONG_CURRENT,
-    WRONG_SENSOR,
-    WRONG_VOLTAGE,
-)
 from katana450.extensions.real_arm import driver_thread
 from katana450.extensions.real_arm.emulator.server import ServoServer
 from katana450.extensions.real_arm.options import driver
@@ -245,8 +237,6 @@ class Fault:
 
     def put(self, server: ServoServer, number: int, *, present: bool) -> None:
         motor = server.arm.motors[number]
-        errors = motor.make.errors.items()
-        bit = next((bit for bit, text in errors if text == self.words), 0)
         with server.lock:
             if self.name in ("silent", "blocked"):
                 setattr(motor, self.name, present)
@@ -254,16 +244,12 @@ class Fault:
                 if present:
                     motor.reboot()
             else:
-                motor.fault = bit if present else 0
+                bits = {name: bit for bit, name in motor.make.errors.items()}
+                motor.fault = bits[self.name] if present else 0
 
 
 FAULTS = (
-    Fault("overload", OVERLOADED),
-    Fault("heat", HOT),
-    Fault("voltage", WRONG_VOLTAGE),
-    Fault("current", WRONG_CURRENT),
-    Fault("shock", SHOCK),
-    Fault("sensor", WRONG_SENSOR),
+    *(Fault(name, text) for name, text in machine.ERRORS.items()),
     Fault("silent", "No answer of"),
     Fault("reset", "is limp: it was reset"),
     Fault("blocked", "Something blocks", ArmMode.COLLIDED),
@@ -274,7 +260,8 @@ FAULTS = (
 def test_fault_stops_the_arm_where_it_is_with_a_true_sentence(
     server: ServoServer, kind: ServoArm, loop: SmallLoop, fault: Fault
 ) -> None:
-    if fault.words in (WRONG_CURRENT, SHOCK) and fault.words not in kind.make.errors.values():
+    errors = kind.make.errors.values()
+    if fault.name in machine.ERRORS and fault.name not in errors:
         pytest.skip("the motors report no such error")
     chance = random.Random(fault.name)
     engage(loop)
@@ -290,7 +277,7 @@ def test_fault_stops_the_arm_where_it_is_with_a_true_sentence(
         loop.wait(fault.mode, PATIENCE)
         note = loop.report.note
         assert fault.words in note
-        if fault.words in kind.make.errors.values():
+        if fault.name in errors:
             assert "(7.4 V, 30 °C)" in note
         assert list(calibration())[number] in note
         # As the session does for a report that does not follow.

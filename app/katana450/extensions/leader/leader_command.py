@@ -116,8 +116,8 @@ def prepare(bus: MotorBus, calibration: Calibration, motors: tuple[int, ...]) ->
     for motor in motors:
         check_calibration(bus, names[motor], calibration[names[motor]])
         bus.write(motor, FEETECH.torque_enable, 0)
-        if errors := bus.errors(motor):
-            print(printable(f"{names[motor]} {bus.make.sentence(errors)}."))
+        if errors := bus.make.error_names(bus.errors(motor)):
+            print(printable(f"{names[motor]} reports: {', '.join(errors)}."))
 
 
 class LeaderRun:

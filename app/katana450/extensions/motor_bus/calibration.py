@@ -25,9 +25,6 @@ MOTORS = (*AXES, GRIPPER)
 MAX_BYTES = 64_000
 """Maximum size of a calibration file."""
 
-MAX_OFFSET = 256 * TURN
-"""[ticks] Homing offset that no motor exceeds; an STS3215 has at most half a turn."""
-
 Ticks = Annotated[int, Meta(ge=-TURN, le=2 * TURN)]
 
 
@@ -44,7 +41,7 @@ class MotorCalibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     id: Annotated[int, Meta(ge=0, le=MAX_ID)]
     drive_mode: Annotated[int, Meta(ge=0, le=15)]
-    homing_offset: Annotated[int, Meta(gt=-MAX_OFFSET, lt=MAX_OFFSET)]
+    homing_offset: int
     range_min: Ticks
     range_max: Ticks
 

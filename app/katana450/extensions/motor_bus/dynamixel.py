@@ -6,16 +6,7 @@ bytes. Source: ROBOTIS' manuals of the protocol and of these motors.
 
 from __future__ import annotations
 
-from katana450.extensions.motor_bus.packets import (
-    HOT,
-    OVERLOADED,
-    SHOCK,
-    WRONG_SENSOR,
-    WRONG_VOLTAGE,
-    Framing,
-    Register,
-    ServoMake,
-)
+from katana450.extensions.motor_bus.packets import Framing, Register, ServoMake
 
 POLYNOMIAL = 0x8005
 
@@ -75,17 +66,11 @@ DYNAMIXEL = ServoMake(
     units=(1.0, 0.229 * 4096 / 60.0, 1.0 / FULL_PWM, 0.1, 1.0),
     modes=(POSITION_MODE, EXTENDED_POSITION_MODE, CURRENT_POSITION_MODE),
     counts_turns=True,
-    settings=((GOAL_PWM, FULL_PWM), *PROFILES_OFF),
+    settings=PROFILES_OFF,
     jaw_settings=((GOAL_PWM, FULL_PWM // 2), *PROFILES_OFF),
     force_limit=GOAL_PWM,
     full_force=FULL_PWM,
-    errors={
-        0x20: OVERLOADED,
-        0x04: HOT,
-        0x01: WRONG_VOLTAGE,
-        0x10: SHOCK,
-        0x08: WRONG_SENSOR,
-    },
+    errors={0x20: "overload", 0x04: "heat", 0x01: "voltage", 0x10: "shock", 0x08: "sensor"},
     hardware_error=Register(70, 1),
     alert=0x80,
     refusal=0x7F,

@@ -6,16 +6,7 @@ or the errors of a motor. Source: the memory table and protocol of Feetech's STS
 
 from __future__ import annotations
 
-from katana450.extensions.motor_bus.packets import (
-    HOT,
-    OVERLOADED,
-    WRONG_CURRENT,
-    WRONG_SENSOR,
-    WRONG_VOLTAGE,
-    Framing,
-    Register,
-    ServoMake,
-)
+from katana450.extensions.motor_bus.packets import Framing, Register, ServoMake
 
 HEADER = b"\xff\xff"
 
@@ -58,11 +49,5 @@ FEETECH = ServoMake(
     jaw_settings=((TORQUE_LIMIT, FULL_FORCE // 2), (ACCELERATION, MAX_ACCELERATION)),
     force_limit=TORQUE_LIMIT,
     full_force=FULL_FORCE,
-    errors={
-        0x20: OVERLOADED,
-        0x04: HOT,
-        0x01: WRONG_VOLTAGE,
-        0x08: WRONG_CURRENT,
-        0x02: WRONG_SENSOR,
-    },
+    errors={0x20: "overload", 0x04: "heat", 0x01: "voltage", 0x08: "current", 0x02: "sensor"},
 )

@@ -144,15 +144,6 @@ class Framing:
         return b"".join(value.to_bytes(self.word, "little") for value in values)
 
 
-OVERLOADED = "is overloaded and has reduced its force. Take the load off"
-HOT = "is too hot. Support the arm, release it and let it cool"
-WRONG_VOLTAGE = "has too low or too high a voltage. Check the power supply"
-WRONG_CURRENT = "takes too much current. Take the load off"
-WRONG_SENSOR = "reports a fault of its sensor. Support the arm and release it"
-SHOCK = "reports an electric shock or too little power. Check the power supply and the cables"
-"""Ends of sentences about the errors of a motor."""
-
-
 @dataclass(frozen=True)
 class ServoMake:
     """The servos of one maker: the framing of their packets, their registers and units.
@@ -166,7 +157,7 @@ class ServoMake:
         settings, jaw_settings: values that are written before a motor of a joint, and that of a
             jaw, holds.
         force_limit, full_force: register of the largest force, and its value for all force.
-        errors: ends of sentences by the bits of the errors.
+        errors: names of the errors by their bits.
         hardware_error: register of these bits; None if each answer has them.
         alert, refusal: bits of an answer that tell that there are errors, and why a request is
             refused; 0 without them.
@@ -205,9 +196,9 @@ class ServoMake:
         """The registers of a reading, in the order of the units."""
         return self.position, self.speed, self.load, self.voltage, self.temperature
 
-    def sentence(self, errors: int) -> str:
-        """Return the end of the sentence about the first of the bits ``errors``; empty for none."""
-        return next((text for bit, text in self.errors.items() if errors & bit), "")
+    def error_names(self, errors: int) -> list[str]:
+        """Return the names of the bits ``errors``."""
+        return [name for bit, name in self.errors.items() if errors & bit]
 
 
 class PacketReader:

@@ -55,6 +55,17 @@ MAX_ASTRAY = np.radians(17.0)
 """[rad] Distance of a joint beyond its limits that no correct calibration gives."""
 
 
+ERRORS = {
+    "overload": "is overloaded and has reduced its force. Take the load off",
+    "heat": "is too hot. Support the arm, release it and let it cool",
+    "voltage": "has too low or too high a voltage. Check the power supply",
+    "current": "takes too much current. Take the load off",
+    "shock": "reports an electric shock or too little power. Check power supply and cables",
+    "sensor": "reports a fault of its sensor. Support the arm and release it",
+}
+"""Ends of sentences about the errors of a motor."""
+
+
 class Readings(NamedTuple):
     """One reading of all motors: ticks, ticks/s, fractions of the torque, V, degrees C: (6,) each.
 
@@ -225,10 +236,10 @@ class ServoMachine(ArmModes):
     def _supervise(self, readings: Readings, beyond: FloatArray) -> None:
         """Compare a reading with the mode. ``beyond`` (6,): angles beyond the limits [rad]."""
         for number, errors in enumerate(readings.errors):
-            text = self._joints.arm.make.sentence(errors)
-            if text and self.mode is not ArmMode.FAULT:
+            names = self._joints.arm.make.error_names(errors)
+            if names and self.mode is not ArmMode.FAULT:
                 values = f"{readings.volts[number]:.1f} V, {readings.celsius[number]:.0f} °C"
-                self.fail(f"{self.name(self._joints.ids[number])} {text} ({values}).")
+                self.fail(f"{self.name(self._joints.ids[number])} {ERRORS[names[0]]} ({values}).")
         if self.mode is ArmMode.CONNECTED and beyond[:JAW].max() > MAX_ASTRAY:
             name = MOTORS[int(beyond[:JAW].argmax())]
             self.note = f"{name} is beyond its limit: calibrate the arm by `lerobot-calibrate`."
