@@ -203,7 +203,7 @@ def test_owner_takes_over_by_moving_the_arm(table: Staged, move: cmd.Command) ->
     assert table.hub.lease.holder == owner.person
     assert table.bar(owner)["why"].startswith("You took over at step 1 of 2. Continue resumes")
     assert table.bar(owner)["orders"] == ["continue", "rewind"]
-    with pytest.raises(LeaseError, match="Nobody has taken over"):
+    with pytest.raises(LeaseError, match="belongs to Window 1"):
         table.programs.steer(other, ProgramOrder.REWIND)
     table.programs.steer(owner, ProgramOrder.REWIND)
     restored = table.arm.commands[-1]

@@ -422,6 +422,7 @@ class ProgramRunner(Runner):
         """Restore the state in which the owner took over, and hold the arm there."""
         takeover = self.hub.gate.takeover_by(participant.person)
         if takeover is None:
+            self._owner.check_may_steer(participant.person)
             raise LeaseError("Nobody has taken over from this program.")
         self.hub.move(participant, cmd.RestoreState(takeover.state))
         return self.hub.move(participant, cmd.Hold())
