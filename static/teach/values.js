@@ -33,7 +33,7 @@ export class Values {
       if (field.text !== text) field.input.value = field.text = text;
       set(field.input, "title", about);
       set(field.input, "data-line", line ?? "");
-      write(field.unit, step && unit !== field.name ? unit : "");
+      write(field.unit, step && unit !== field.name ? unit.replace("deg", "°") : "");
       const problem = !before && problems.find((other) => other.line === line && (other.column === column || (!other.column && values.length === 1)));
       write(field.why, (problem && problem.column && problem.text) || "");
       set(field.input, "aria-description", field.why.textContent ?? "");

@@ -124,14 +124,14 @@ def test_end_of_a_program_is_told_until_the_next_command(table: Staged) -> None:
     assert table.bar(owner)["headline"] == "Nap: done in 42 s"
     table.plan(owner, "steps:\n  - joints: [20, -60, 80, 8, 999]\n")
     shown = table.bar(owner)
-    assert (shown["mood"], shown["headline"]) == ("limited", "Cannot run: the script")
+    assert (shown["mood"], shown["headline"]) == ("limited", "Not possible: the script")
     assert "999" in shown["why"]
     # It may be mended, or another text is edited.
     wrong = table.arm.rest
     table.arm.rest = replace(wrong, grip=0.1)
     assert table.bar(owner)["headline"] == "On target"
     table.arm.rest = wrong
-    assert table.bar(owner)["headline"] == "Cannot run: the script"
+    assert table.bar(owner)["headline"] == "Not possible: the script"
     table.programs.handle(owner, Preview(at=None))
     assert table.bar(owner)["headline"] == "On target"
     table.plan(owner, "steps:\n  - joints: [20, -60, 80, 8, 999]\n")

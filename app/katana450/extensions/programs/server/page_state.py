@@ -29,7 +29,7 @@ ENDED = (Phase.DONE.value, Phase.STOPPED.value, Phase.FAILED.value)
 ENDS = {
     Phase.STOPPED.value: "Ended",
     Phase.FAILED.value: "Failed",
-    PlanningPhase.REFUSED.value: "Cannot run",
+    PlanningPhase.REFUSED.value: "Not possible",
     PlanningPhase.CANCELLED.value: "Not planned",
 }
 """The sentence of the page about a program with this status."""
