@@ -69,10 +69,10 @@ def test_pictures_are_new_and_a_slow_page_gets_fewer(server: AppServer) -> None:
         got = [asked(socket) for _ in range(30)]
         assert len({part[1] for part in got if isinstance(part, tuple)}) == 30
         # None waits for a page that does not ask.
-        time.sleep(0.2)
+        time.sleep(1.0)
         answer = asked(socket)
         assert isinstance(answer, tuple)
-        assert 0.0 <= answer[0] < 0.15
+        assert 0.0 <= answer[0] < 0.8
 
 
 def test_simulated_hand_sees_where_the_arm_is(server: AppServer) -> None:
