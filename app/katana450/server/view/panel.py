@@ -164,7 +164,7 @@ class Panel:
         if self._gripper is not None:
             set_slider(self._gripper, self._opening(state.gripper_goal))
         if self._suction is not None:
-            set_value(self._suction, state.gripper_goal != self._model.gripper.opened)
+            set_value(self._suction, self._switched(state))
         if self._form is not None:
             self._form.set_controls(state)
 
@@ -209,14 +209,18 @@ class Panel:
         listen(buttons, lambda: cmd.Gripper(ends_of[buttons.value]))
         return slider
 
-    def _cup(self, state: State, listen: Listen) -> viser.GuiInputHandle[bool]:
+    def _switched(self, state: State) -> str:
+        return "Off" if state.gripper_goal == self._model.gripper.opened else "On"
+
+    def _cup(self, state: State, listen: Listen) -> viser.GuiDropdownHandle[str]:
         cup = self._model.gripper
-        switch = self._gui.add_checkbox(
+        switch = self._gui.add_dropdown(
             "Suction",
-            state.gripper_goal != cup.opened,
+            ("Off", "On"),
+            initial_value=self._switched(state),
             hint="On: the cup goes out to the flat face before it, and holds it. Off: it lets go",
         )
-        listen(switch, lambda: cmd.Gripper(cup.closed if switch.value else cup.opened))
+        listen(switch, lambda: cmd.Gripper(cup.closed if switch.value == "On" else cup.opened))
         return switch
 
     def _opening(self, angle: float) -> float:
