@@ -21,7 +21,7 @@ SHOWN = {
     "Axis 2 (shoulder) at its limit of −12.50°.": "Achse 2 (Schulter) an der Grenze von −12,50°.",
     "13:43:22: You pressed STOP.": "13:43:22: Sie haben STOPP gedrückt.",
     "Pour: line, step 4 of 7, 26 s left.": "Pour: Linie, Schritt 4 von 7, noch 26 s.",
-    "Nothing was saved: Anna is away.": "Nichts gespeichert: Anna is away.",
+    "Not run: Anna is away.": "Nicht ausgeführt: Anna is away.",
 }
 """Words of server and page, and those that are shown in German."""
 
