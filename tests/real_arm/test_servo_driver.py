@@ -138,7 +138,7 @@ def test_bus_scans_reads_writes_and_changes_ids(
     motors = MotorBus(open_port(address, "the arm"), make)
     try:
         ids = tuple(range(first, first + 6))
-        assert motors.scan(range(1, 19)) == ids
+        assert motors.scan(range(first, first + 8)) == ids
         assert tuple(motors.read(number, make.model) for number in ids) == kind.models
         assert motors.errors(first) == 0
         motors.write(first + 5, make.id, first + 7)
