@@ -36,7 +36,7 @@ from katana450.errors import KatanaError
 from katana450.extensions.cameras.camera_link import AGE
 from katana450.server.api import answers, requests
 from katana450.server.service.budget import IDENTITY_BUDGET, MAX_DEBT
-from tests.browser.server import ATTENTIVE_APP, AppServer, free_port
+from tests.browser.server import ATTENTIVE_APP, RECORDING_APP, AppServer, free_port
 from tests.cameras.mjpeg_camera import stamp_of
 from tests.gateway.client import SUBPROTOCOL, Peer, enter, page_name, websocket
 
@@ -328,7 +328,8 @@ def main() -> None:
             stack.callback(camera.kill)
             assert camera.stdout is not None
             sources.append(f"--camera={name}={camera.stdout.readline().decode().strip()}")
-        server = stack.enter_context(AppServer((*ATTENTIVE_APP, *sources)))
+        # The pictures are recorded too, since the arm moves.
+        server = stack.enter_context(AppServer((*RECORDING_APP, "--strict-silence", *sources)))
         _run_turns(server, options.stops, "--with-cameras")
 
 
