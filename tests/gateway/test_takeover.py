@@ -77,7 +77,7 @@ def test_person_takes_over_from_a_policy_without_a_step(drive: Drive) -> None:
         drive.wait(0.3 + 0.02 * int(rng.integers(50)), ada)
         assert (hub.lease.holder, hub.stopped) == (policy, None)
         hub.move(ada, MOVES[number % len(MOVES)])
-        # The policy goes on streaming, and is refused.
+        # The policy still streams; its setpoints are refused.
         drive.wait(0.4, ada)
         assert hub.lease.holder == ada.person
         assert orders(drive, ada) == ["continue", "rewind"]

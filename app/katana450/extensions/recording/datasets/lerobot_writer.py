@@ -118,7 +118,7 @@ INTERVENTION = "complementary_info.is_intervention"
 """1 where a person drove the arm, by the name that learners from corrections read; else 0."""
 
 SOURCE, SOURCES = "complementary_info.source", (PERSON, PROGRAM, POLICY)
-"""What drove the arm: the place in SOURCES; -1 if nothing has moved it yet."""
+"""Index in SOURCES of what commanded the newest motion; -1 before the first motion."""
 
 TIMESTAMP, FRAME, EPISODE, INDEX, TASK = (
     "timestamp",

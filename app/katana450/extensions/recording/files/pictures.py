@@ -10,6 +10,7 @@ import struct
 from typing import Final
 
 from katana450.errors import InputError
+from katana450.extensions.cameras.sources import JPEG
 from katana450.extensions.recording.files.recording_file import Message
 from katana450.extensions.recording.messages import CAMERAS, NANO
 
@@ -32,9 +33,6 @@ uint32 nanosec
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 """First bytes of a message."""
-
-JPEG = b"\xff\xd8"
-"""First bytes of every JPEG file."""
 
 
 def picture_message(camera: str, log_time: int, jpeg: bytes) -> Message:
